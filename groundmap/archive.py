@@ -1,0 +1,88 @@
+"""One-file archives of arrays with a header: no pickle, atomic, versioned.
+
+The file is a zip of ``.npy`` members (an ``.npz``), so NumPy alone can open it; the member
+``header`` is JSON.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+import zipfile
+from collections.abc import Callable, Mapping
+from os import PathLike
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from groundmap.errors import FileFormatError
+
+
+def write_atomically(path: str | PathLike[str], write: Callable[[IO[bytes]], object]) -> None:
+    """Call `write` on a temporary file beside `path`, then rename it: all or nothing."""
+    target = Path(path)
+    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            write(stream)
+            stream.flush()
+            os.fsync(stream.fileno())
+        # mkstemp makes private files; a map is as readable as any other file of its owner.
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(temporary, 0o666 & ~umask)
+        os.replace(temporary, target)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def write_archive(
+    path: str | PathLike[str],
+    header: Mapping[str, Any],
+    arrays: Mapping[str, npt.NDArray[np.generic]],
+) -> None:
+    """Write a header and arrays to one compressed file, atomically."""
+    text = np.array(json.dumps(header))
+
+    def write(stream: IO[bytes]) -> None:
+        np.savez_compressed(stream, allow_pickle=False, header=text, **arrays)
+
+    write_atomically(path, write)
+
+
+def read_archive(
+    path: str | PathLike[str], expected_format: str, newest_version: int
+) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
+    """Return header and arrays of a file that `write_archive` wrote.
+
+    Raises
+    ------
+    FileFormatError
+        Missing, no archive, truncated, of another format or of a newer version.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        header = json.loads(str(arrays.pop("header")))
+    except FileNotFoundError as error:
+        raise FileFormatError(path, f"a {expected_format} file", "no file of that name") from error
+    except IsADirectoryError as error:
+        raise FileFormatError(path, f"a {expected_format} file", "a folder") from error
+    except (zipfile.BadZipFile, KeyError, ValueError, TypeError, EOFError, OSError) as error:
+        raise FileFormatError(
+            path, f"a {expected_format} file", f"something else ({type(error).__name__})"
+        ) from error
+    if not isinstance(header, dict) or header.get("format") != expected_format:
+        raise FileFormatError(path, f"a {expected_format} file", "another kind of archive")
+    if header.get("version", 0) > newest_version:
+        raise FileFormatError(
+            path,
+            f"version {newest_version} or older",
+            f"version {header['version']}",
+            hint="Upgrade groundmap.",
+        )
+    return header, arrays

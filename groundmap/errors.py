@@ -1,0 +1,91 @@
+"""Everything that groundmap raises on purpose.
+
+::
+
+    GroundmapError
+    ├── InputError (ValueError)      an array or a number is not what was asked for
+    │   ├── SettingsError            a setting is unknown or out of its range
+    │   ├── CameraError              a rig or a pose that no camera can have
+    │   └── FileFormatError          a file does not say what its format asks for
+    ├── NoGroundPlaneError           a camera with no ground plane below it
+    └── MergeError                   two maps that do not add up
+
+The exceptions take facts and compose the message, so that every message reads alike:
+what was expected, what came instead, where it was first seen, and what to do.
+"""
+
+from __future__ import annotations
+
+from os import PathLike
+
+
+class GroundmapError(Exception):
+    """Base of every exception of this package."""
+
+
+class InputError(GroundmapError, ValueError):
+    """A value is not what was asked for.
+
+    Parameters
+    ----------
+    name : str
+        What the value is called where the caller wrote it.
+    expected, got : str
+        What it should have been, and what it is.
+    where : str, optional
+        The first place that offends, such as ``"row 3"``.
+    hint : str, optional
+        What to do about it.
+
+    Examples
+    --------
+    >>> print(InputError("baseline", "a number above 0 [m]", "0.0", hint="Give the rig's."))
+    baseline: expected a number above 0 [m], got 0.0. Give the rig's.
+    """
+
+    def __init__(
+        self, name: str, expected: str, got: str, *, where: str = "", hint: str = ""
+    ) -> None:
+        self.name, self.expected, self.got, self.where, self.hint = name, expected, got, where, hint
+        place = f" at {where}" if where else ""
+        advice = f" {hint}" if hint else ""
+        super().__init__(f"{name}: expected {expected}, got {got}{place}.{advice}")
+
+
+class SettingsError(InputError):
+    """A setting is unknown or out of its range."""
+
+
+class CameraError(InputError):
+    """A rig or a pose that no camera can have."""
+
+
+class FileFormatError(InputError):
+    """A file does not say what its format asks for.
+
+    Examples
+    --------
+    >>> print(FileFormatError("poses.txt", "8 columns", "7", line=12))
+    poses.txt: expected 8 columns, got 7 at line 12.
+    """
+
+    def __init__(
+        self,
+        path: str | PathLike[str],
+        expected: str,
+        got: str,
+        *,
+        line: int | None = None,
+        hint: str = "",
+    ) -> None:
+        where = "" if line is None else f"line {line}"
+        super().__init__(str(path), expected, got, where=where, hint=hint)
+        self.path, self.line = path, line
+
+
+class NoGroundPlaneError(GroundmapError):
+    """A camera with no ground plane below it."""
+
+
+class MergeError(GroundmapError):
+    """Two maps that do not add up: other resolution, frame, origin or rule."""

@@ -1,0 +1,194 @@
+"""Views: what one stereo observation gives, in the form that everything after it reads."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from groundmap.arrays import Floats, Ints, as_floats
+from groundmap.camera import StereoRig
+from groundmap.errors import InputError
+from groundmap.frames import check_transform
+
+if TYPE_CHECKING:
+    from groundmap.ground import GroundPlane
+
+
+@dataclass(frozen=True)
+class Features:
+    """Point or segment features of one view, in the camera frame.
+
+    Parameters
+    ----------
+    xyz : array_like, shape (n, 3) or (n, 2, 3) [m, camera]
+        Points, or both ends of segments.
+    covariance : array_like, shape (n, 3, 3) or (n, 2, 3, 3) [m², camera]
+    ids : array_like, shape (n,), optional
+        Landmark ids; -1 where a feature has none.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not belong together.
+    """
+
+    xyz: Floats
+    covariance: Floats
+    ids: Ints
+
+    def __post_init__(self) -> None:
+        if len(self.covariance) != len(self.xyz) or len(self.ids) != len(self.xyz):
+            raise InputError(
+                "features",
+                f"covariance and ids of the {len(self.xyz)} features",
+                f"{len(self.covariance)} and {len(self.ids)}",
+            )
+
+    def __len__(self) -> int:
+        return len(self.xyz)
+
+    @classmethod
+    def points(
+        cls, xyz: npt.ArrayLike, covariance: npt.ArrayLike, ids: npt.ArrayLike | None = None
+    ) -> Features:
+        """Return point features from XYZ and covariance."""
+        return cls._checked(xyz, covariance, ids, ())
+
+    @classmethod
+    def segments(
+        cls, xyz: npt.ArrayLike, covariance: npt.ArrayLike, ids: npt.ArrayLike | None = None
+    ) -> Features:
+        """Return segment features from the XYZ and covariance of both ends."""
+        return cls._checked(xyz, covariance, ids, (2,))
+
+    @classmethod
+    def _checked(
+        cls,
+        xyz: npt.ArrayLike,
+        covariance: npt.ArrayLike,
+        ids: npt.ArrayLike | None,
+        ends: tuple[int, ...],
+    ) -> Features:
+        positions = as_floats("xyz", xyz, (None, *ends, 3))
+        spread = as_floats("covariance", covariance, (None, *ends, 3, 3))
+        if ids is None:
+            return cls(positions, spread, np.full(len(positions), -1, dtype=np.int64))
+        return cls(positions, spread, np.asarray(ids, dtype=np.int64))
+
+    def select(self, keep: npt.NDArray[np.generic]) -> Features:
+        """Return the features that a mask or an index array picks."""
+        return Features(self.xyz[keep], self.covariance[keep], self.ids[keep])
+
+
+@dataclass(frozen=True, kw_only=True)
+class View:
+    """One stereo observation.
+
+    Parameters
+    ----------
+    T_map_base : array_like, shape (4, 4)
+        Pose of ``base_link`` in the map.
+    rig : StereoRig
+    points, segments : Features
+        Features in the camera frame. Rows that are not finite or lie behind the camera are
+        dropped and counted; `from_pixels` counts those without disparity, too.
+    timestamp : float, optional [s]
+    plane : GroundPlane, optional
+        The ground under this view; `groundmap.fit_ground` puts it there.
+    dropped : Counter
+        Features given but not kept, by reason.
+
+    Raises
+    ------
+    CameraError
+        The pose is not a rigid transform.
+    """
+
+    T_map_base: Floats
+    rig: StereoRig
+    points: Features = field(default_factory=lambda: _no_features(()))
+    segments: Features = field(default_factory=lambda: _no_features((2,)))
+    timestamp: float | None = None
+    plane: GroundPlane | None = None
+    dropped: Counter[str] = field(default_factory=Counter)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_map_base", check_transform("T_map_base", self.T_map_base))
+        dropped = Counter(self.dropped)
+        for name in ("points", "segments"):
+            features: Features = getattr(self, name)
+            axes = tuple(range(1, features.xyz.ndim))
+            finite = np.isfinite(features.xyz).all(axis=axes)
+            finite &= np.isfinite(features.covariance).all(axis=(*axes, axes[-1] + 1))
+            with np.errstate(invalid="ignore"):
+                ahead = (features.xyz[..., 2].reshape(len(features), -1) > 0).all(axis=1)
+            if not (finite & ahead).all():
+                dropped["not_finite"] += int((~finite).sum())
+                dropped["behind_camera"] += int((finite & ~ahead).sum())
+                object.__setattr__(self, name, features.select(finite & ahead))
+        object.__setattr__(self, "dropped", +dropped)
+
+    @classmethod
+    def from_pixels(
+        cls,
+        T_map_base: npt.ArrayLike,
+        rig: StereoRig,
+        *,
+        points_px: npt.ArrayLike = (),
+        segments_px: npt.ArrayLike = (),
+        point_ids: npt.ArrayLike | None = None,
+        segment_ids: npt.ArrayLike | None = None,
+        timestamp: float | None = None,
+    ) -> View:
+        """Return the view of matched pixels: (uL, uR, v), or both ends of segments [px].
+
+        Examples
+        --------
+        >>> rig = StereoRig(fx=700.0, fy=700.0, cx=320.0, cy=240.0, baseline=0.5)
+        >>> view = View.from_pixels(np.eye(4), rig, points_px=[(355, 320, 275), (320, 320, 240)])
+        >>> len(view.points), dict(view.dropped)
+        (1, {'no_disparity': 1})
+        """
+        points = rig.triangulate(as_floats("points_px", points_px, (None, 3)))
+        segments = rig.triangulate(as_floats("segments_px", segments_px, (None, 2, 3)))
+        return cls(
+            T_map_base=np.asarray(T_map_base, dtype=np.float64),
+            rig=rig,
+            points=Features.points(
+                points.xyz, points.covariance, _kept(point_ids, points.kept, "point_ids")
+            ),
+            segments=Features.segments(
+                segments.xyz, segments.covariance, _kept(segment_ids, segments.kept, "segment_ids")
+            ),
+            timestamp=timestamp,
+            dropped=points.dropped + segments.dropped,
+        )
+
+    @property
+    def T_map_camera(self) -> Floats:
+        """Pose of the left camera in the map, shape (4, 4)."""
+        return self.T_map_base @ self.rig.T_base_camera
+
+    def with_plane(self, plane: GroundPlane) -> View:
+        """Return this view standing on `plane`, given in its ``base_link`` frame."""
+        return replace(self, plane=plane)
+
+
+def _kept(ids: npt.ArrayLike | None, kept: npt.NDArray[np.bool_], name: str) -> Ints | None:
+    if ids is None:
+        return None
+    array = np.asarray(ids, dtype=np.int64)
+    if array.shape != kept.shape:
+        raise InputError(name, f"shape {kept.shape}", f"shape {array.shape}")
+    picked: Ints = array[kept]
+    return picked
+
+
+def _no_features(ends: tuple[int, ...]) -> Features:
+    return Features(
+        np.empty((0, *ends, 3)), np.empty((0, *ends, 3, 3)), np.empty(0, dtype=np.int64)
+    )

@@ -1,0 +1,83 @@
+"""Update rules: how what one view says is added to what is known, by name."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from groundmap.arrays import Counts, Floats32
+from groundmap.errors import InputError
+from groundmap.kernels.fuse import merge_average, update_average
+
+UNCAPPED = np.iinfo(np.uint32).max
+
+
+@dataclass(frozen=True)
+class Average:
+    """Running average of all views (paper, equation 1): every view weighs the same for ever."""
+
+    name: ClassVar[str] = "average"
+    mergeable: ClassVar[bool] = True
+
+    def update(self, confidence: Floats32, count: Counts, z: Floats32) -> None:
+        """Add evidence `z` (0 says nothing) in place; C-contiguous arrays of one shape."""
+        update_average(confidence.reshape(-1), count.reshape(-1), z.reshape(-1), UNCAPPED)
+
+    def merge(
+        self, confidence: Floats32, count: Counts, other: Floats32, other_count: Counts
+    ) -> None:
+        """Add another map's values in place: the mean of all views of both."""
+        merge_average(
+            confidence.reshape(-1), count.reshape(-1), other.reshape(-1), other_count.reshape(-1)
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what a file needs to know the rule again."""
+        return {"name": self.name, **asdict(self)}
+
+
+@dataclass(frozen=True)
+class Capped(Average):
+    """Running average whose count stops at `cap`: from there on old views fade.
+
+    A cell that changes for good has changed sign after about 0.7 `cap` views.
+
+    Parameters
+    ----------
+    cap : int, default 50
+        Largest update count.
+    """
+
+    name: ClassVar[str] = "capped"
+    mergeable: ClassVar[bool] = False
+
+    cap: int = 50
+
+    def __post_init__(self) -> None:
+        if not self.cap >= 1:
+            raise InputError("cap", "a count of 1 or more", str(self.cap))
+
+    def update(self, confidence: Floats32, count: Counts, z: Floats32) -> None:
+        """Add evidence `z` (0 says nothing) in place; C-contiguous arrays of one shape."""
+        update_average(confidence.reshape(-1), count.reshape(-1), z.reshape(-1), self.cap)
+
+
+UpdateRule = Average
+RULES: dict[str, type[Average]] = {rule.name: rule for rule in (Average, Capped)}
+
+
+def rule_from(described: dict[str, Any]) -> UpdateRule:
+    """Return the rule that `UpdateRule.to_dict` described.
+
+    Raises
+    ------
+    InputError
+        No rule of that name.
+    """
+    parameters = dict(described)
+    name = parameters.pop("name", None)
+    if name not in RULES:
+        raise InputError("rule", f"one of {', '.join(RULES)}", repr(name))
+    return RULES[name](**parameters)

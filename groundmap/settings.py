@@ -1,0 +1,83 @@
+"""Settings: frozen, keyword-only, validated; an unknown key names the nearest valid one."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from groundmap.errors import SettingsError
+
+
+class Settings(BaseModel):
+    """Base of every settings class, in both packages.
+
+    Raises
+    ------
+    SettingsError
+        A key that does not exist (the nearest one is named), or a value out of range.
+
+    Examples
+    --------
+    >>> MapperSettings(resolutoin=0.1)
+    Traceback (most recent call last):
+        ...
+    groundmap.errors.SettingsError: resolutoin: expected a setting of MapperSettings, got an \
+unknown key. Did you mean 'resolution'?
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    def __init__(self, **values: Any) -> None:
+        known = type(self).model_fields
+        for key in values:
+            if key not in known:
+                raise SettingsError(
+                    key,
+                    f"a setting of {type(self).__name__}",
+                    "an unknown key",
+                    hint=_nearest(key, list(known)),
+                )
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            first = error.errors()[0]
+            name = ".".join(str(part) for part in first["loc"])
+            expected = first["msg"].removeprefix("Input should be ")
+            raise SettingsError(name, expected, repr(first["input"])) from None
+
+
+def _nearest(key: str, known: list[str]) -> str:
+    close = get_close_matches(key, known, n=1)
+    return f"Did you mean {close[0]!r}?" if close else f"There are: {', '.join(sorted(known))}."
+
+
+class MapperSettings(Settings):
+    """All that `groundmap.GroundMapper` can be told; lengths in metres, angles in radians."""
+
+    resolution: float = Field(0.1524, gt=0, description="size of a cell [m]; 6 inches")
+    mode: Literal["2d"] = Field("2d", description="ground plane (2d)")
+    frame: str = Field("map", description="name of the frame the map is in")
+    fusion: Literal["average", "capped"] = Field("average", description="how views add up")
+    cap: int = Field(50, ge=1, description="update count at which 'capped' starts to forget")
+    uncertainty: Literal["ellipsoid", "radius", "none"] = Field(
+        "ellipsoid", description="how a surface spreads over the cells it may be in"
+    )
+    spread_sigmas: float = Field(2.0, ge=0, description="spread of a surface [standard deviations]")
+    min_range: float = Field(0.3, gt=0, description="nearer features are dropped [m]")
+    max_range: float = Field(20.0, gt=0, description="farther features are dropped [m]")
+    step_height: float = Field(0.15, gt=0, description="what the robot drives over [m]")
+    robot_height: float = Field(2.0, gt=0, description="higher features are overhead [m]")
+    narrowest_footprint: float = Field(
+        1.0, gt=0, description="width of the narrowest robot that will use the map [m]"
+    )
+    link_length: float = Field(0.5, ge=0, description="links up to this length are believed [m]")
+    link_angle: float = Field(0.04, ge=0, description="the same, per metre of range [rad]")
+    link_height: float = Field(
+        0.5, ge=0, description="height band of a point feature, for links [m]"
+    )
+    support_width: float = Field(
+        0.3, gt=0, description="half-width of the ground a ground feature vouches for [m]"
+    )
+    support_angle: float = Field(0.05, gt=0, description="its upper bound as a bearing [rad]")

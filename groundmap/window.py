@@ -1,0 +1,80 @@
+"""A dense piece of a grid, the four states of its cells, and where cells lie."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from groundmap.arrays import Bools, Bytes, Counts, Floats, Floats32, Ints, as_floats, check_finite
+
+EPSILON = 0.01  # |confidence| below this is contested
+DROP_OFF_VIEWS = 3  # a drop-off seen in this many views is non-free, whatever the average says
+
+
+class CellState(IntEnum):
+    """The four states of a cell."""
+
+    UNKNOWN = 0  #: never said anything about
+    FREE = 1  #: confidence <= -epsilon
+    NONFREE = 2  #: confidence >= epsilon, or a drop-off
+    CONTESTED = 3  #: in between: the views contradict each other
+
+
+@dataclass(frozen=True)
+class GridWindow:
+    """A dense piece of a grid; arrays are indexed ``[row, col]`` (``[layer, row, col]`` in 3-D).
+
+    Attributes
+    ----------
+    confidence : ndarray of float32
+        Freespace below zero, non-freespace above.
+    count, drop_offs : ndarray of uint32
+        Views that spoke of the cell; views that saw a drop-off there.
+    origin : ndarray, shape (d,) [m, map]
+        Outer corner of cell (0, 0), x first.
+    resolution : float [m]
+    """
+
+    confidence: Floats32
+    count: Counts
+    drop_offs: Counts
+    origin: Floats
+    resolution: float
+
+    def states(self, *, epsilon: float = EPSILON) -> Bytes:
+        """Return the `CellState` of every cell, as uint8."""
+        states = np.full(self.count.shape, CellState.CONTESTED, dtype=np.uint8)
+        states[self.confidence <= -epsilon] = CellState.FREE
+        states[self.confidence >= epsilon] = CellState.NONFREE
+        states[self.count == 0] = CellState.UNKNOWN
+        states[self.drop_offs >= DROP_OFF_VIEWS] = CellState.NONFREE
+        return states
+
+    def world_to_cell(self, xy: npt.ArrayLike) -> Ints:
+        """Return the cells ``[row, col]`` of map positions (x, y) [m], outside ones included."""
+        return cells_of(xy, self.origin, self.resolution)
+
+    def cell_to_world(self, cells: npt.ArrayLike) -> Floats:
+        """Return the centres (x, y) [m, map] of cells ``[row, col]``."""
+        return centres_of(cells, self.origin, self.resolution)
+
+    def contains(self, cells: Ints) -> Bools:
+        """Return which cells lie inside."""
+        inside: Bools = ((cells >= 0) & (cells < self.count.shape)).all(axis=-1)
+        return inside
+
+
+def cells_of(xy: npt.ArrayLike, origin: Floats, resolution: float) -> Ints:
+    """Return the cells of positions: axes reversed, borders belong to the cell they open."""
+    positions = as_floats("xy", np.atleast_2d(np.asarray(xy, dtype=np.float64)), (None, len(origin)))
+    check_finite("xy", positions)
+    return np.floor((positions - origin) / resolution).astype(np.int64)[:, ::-1]
+
+
+def centres_of(cells: npt.ArrayLike, origin: Floats, resolution: float) -> Floats:
+    """Return the centres of cells."""
+    index = np.atleast_2d(np.asarray(cells, dtype=np.int64))
+    return origin + (index[:, ::-1] + 0.5) * resolution
