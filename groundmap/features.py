@@ -125,7 +125,7 @@ class View:
             finite = np.isfinite(features.xyz).all(axis=axes)
             finite &= np.isfinite(features.covariance).all(axis=(*axes, axes[-1] + 1))
             with np.errstate(invalid="ignore"):
-                ahead = (features.xyz[..., 2].reshape(len(features), -1) > 0).all(axis=1)
+                ahead = (features.xyz[..., 2] > 0).all(axis=axes[:-1])
             if not (finite & ahead).all():
                 dropped["not_finite"] += int((~finite).sum())
                 dropped["behind_camera"] += int((finite & ~ahead).sum())

@@ -81,3 +81,14 @@ class MapperSettings(Settings):
         0.3, gt=0, description="half-width of the ground a ground feature vouches for [m]"
     )
     support_angle: float = Field(0.05, gt=0, description="its upper bound as a bearing [rad]")
+
+
+class GroundSettings(Settings):
+    """All that `groundmap.fit_ground` can be told."""
+
+    window: int = Field(11, ge=1, description="views that one plane is fitted to [views]")
+    causal: bool = Field(False, description="use earlier views only, as a live mapper must")
+    max_range: float = Field(20.0, gt=0, description="farther features are left out [m]")
+    lowest_camera: float = Field(0.1, gt=0, description="least height of the camera [m]")
+    highest_camera: float = Field(5.0, gt=0, description="greatest height of the camera [m]")
+    min_support: int = Field(12, ge=3, description="least features on a plane [features]")

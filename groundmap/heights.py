@@ -1,0 +1,247 @@
+"""One view seen from above: features by height class, in the view's own ground frame.
+
+The frame ``view`` has its origin below the left camera, x along the optical axis, y left. All that
+happens to one view (triangulation, sight) happens in this frame, so that the map a view makes does
+not depend on where in the map the view stands; only the last step turns and shifts.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import NamedTuple
+
+import numpy as np
+
+from groundmap.arrays import Bools, Floats, Ints
+from groundmap.errors import NoGroundPlaneError
+from groundmap.features import Features, View
+from groundmap.ground import GroundPlane, check_camera
+from groundmap.settings import MapperSettings
+
+
+class FlatView(NamedTuple):
+    """The features of one view in its ground frame, by height class."""
+
+    viewpoint: Floats  #: shape (2,) [m, map]
+    forward: Floats  #: shape (2,), unit vector [map]: x of the frame ``view``
+    camera_height: float  #: [m] above the ground plane
+    points: Floats  #: shape (n, 2) [m, view], obstacle points and ends of obstacle segments
+    covariance: Floats  #: shape (n, 2, 2) [m², view]
+    bands: Floats  #: shape (n, 2) [m], lowest and highest point of each above the ground
+    segments: Ints  #: shape (m, 2), rows of `points`
+    supports: Floats  #: shape (k, 2) [m, view], where the ground itself was seen
+    support_heights: Floats  #: shape (k,) [m]
+    drop_offs: Floats  #: shape (b, 2) [m, view], features below the ground
+    used: int  #: features that are in any of the above
+    dropped: Counter[str]  #: features that are not, by reason
+
+
+class _Heights(NamedTuple):
+    """Features with all that the height classes ask for; shapes (n, ...) or (m, 2, ...)."""
+
+    xy: Floats
+    covariance: Floats
+    height: Floats
+    tolerance: Floats
+    radius: Floats  # horizontal distance from the camera [m]
+
+    def at(self, t: Floats) -> _Heights:
+        """Interpolate along segments: `t`, shape (m, j), 0 at the first end, 1 at the second."""
+
+        def blend(ends: Floats) -> Floats:
+            weight = t.reshape(*t.shape, *(1,) * (ends.ndim - 2))
+            blended: Floats = ends[:, :1] * (1.0 - weight) + ends[:, 1:] * weight
+            return blended
+
+        xy = blend(self.xy)
+        return _Heights(
+            xy,
+            blend(self.covariance),
+            blend(self.height),
+            blend(self.tolerance),
+            np.hypot(xy[..., 0], xy[..., 1]),
+        )
+
+
+def flatten(view: View, settings: MapperSettings) -> FlatView:
+    """Project a view to its ground plane and sort its features by height.
+
+    Ground features lie within max(step_height, 2 sigma_h + r sigma_tilt) of the plane; obstacle
+    features above that, up to the robot's height; higher ones are overhead, lower ones below
+    ground. A segment that leaves the obstacle band is clipped to it.
+
+    Raises
+    ------
+    NoGroundPlaneError
+        The view carries no plane, or its camera looks at the ground or the sky.
+    """
+    if view.plane is None:
+        raise NoGroundPlaneError(
+            "the view has no ground plane: expected views from groundmap.fit_ground(views), or "
+            "view.with_plane(plane)"
+        )
+    check_camera(view)
+    plane = view.plane
+    T_map_camera = view.T_map_camera
+    forward = T_map_camera[:2, 2] / np.hypot(T_map_camera[0, 2], T_map_camera[1, 2])
+    dropped = Counter(view.dropped)
+    parts = [
+        _point_classes(_measure(view.points, view, plane, forward, settings), settings, dropped),
+        _segment_classes(_measure(view.segments, view, plane, forward, settings), settings, dropped),
+    ]
+    obstacles = [part.obstacles for part in parts]
+    n_points = len(obstacles[0].xy)
+    ends = np.arange(n_points, n_points + len(obstacles[1].xy), dtype=np.int64)
+    height = np.concatenate([part.height for part in obstacles])
+    # A point's own height is all that is known of it; the margin says what may link to it.
+    margin = 0.5 * settings.link_height
+    return FlatView(
+        viewpoint=T_map_camera[:2, 3],
+        forward=forward,
+        camera_height=float(plane.height(view.rig.T_base_camera[:3, 3])),
+        points=np.concatenate([part.xy for part in obstacles]),
+        covariance=np.concatenate([part.covariance for part in obstacles]),
+        bands=np.stack([height - margin, height + margin], axis=1),
+        segments=ends.reshape(-1, 2),
+        supports=np.concatenate([part.ground.xy for part in parts]),
+        support_heights=np.concatenate([part.ground.height for part in parts]),
+        drop_offs=np.concatenate([part.below for part in parts]),
+        used=sum(part.used for part in parts),
+        dropped=+dropped,
+    )
+
+
+def _measure(
+    features: Features, view: View, plane: GroundPlane, forward: Floats, settings: MapperSettings
+) -> _Heights:
+    rotation = view.T_map_camera[:2, :3]
+    # Sums of products in one fixed order: a quarter turn of the map only swaps the two terms.
+    axes = np.stack(
+        [
+            forward[0] * rotation[0] + forward[1] * rotation[1],
+            forward[0] * rotation[1] - forward[1] * rotation[0],
+        ]
+    )
+    x, y, z = np.moveaxis(features.xyz, -1, 0)
+    xy = np.stack([row[0] * x + row[1] * y + row[2] * z for row in axes], axis=-1)
+    radius = np.hypot(xy[..., 0], xy[..., 1])
+    up = view.rig.T_base_camera[:3, :3].T @ plane.normal
+    height = up[0] * x + up[1] * y + up[2] * z
+    height += float(plane.height(view.rig.T_base_camera[:3, 3]))
+    sigma = np.sqrt(np.einsum("i,...ij,j->...", up, features.covariance, up))
+    tolerance = np.maximum(settings.step_height, 2.0 * sigma + radius * plane.sigma_tilt)
+    return _Heights(
+        xy, axes @ features.covariance @ axes.T, height, tolerance, radius
+    )
+
+
+class _Classes(NamedTuple):
+    obstacles: _Heights
+    ground: _Heights
+    below: Floats
+    used: int
+
+
+def _point_classes(
+    points: _Heights, settings: MapperSettings, dropped: Counter[str]
+) -> _Classes:
+    near = points.radius < settings.min_range
+    far = points.radius > settings.max_range
+    inside = ~near & ~far
+    overhead = inside & (points.height > settings.robot_height)
+    below = inside & (points.height < -points.tolerance)
+    ground = inside & (np.abs(points.height) <= points.tolerance)
+    obstacle = inside & ~overhead & ~below & ~ground
+    dropped.update(
+        too_near=int(near.sum()), out_of_range=int(far.sum()), overhead=int(overhead.sum())
+    )
+    dropped["below_ground"] += int(below.sum())
+    return _Classes(
+        _pick(points, obstacle),
+        _pick(points, ground),
+        points.xy[below],
+        int(obstacle.sum() + ground.sum()),
+    )
+
+
+def _segment_classes(
+    segments: _Heights, settings: MapperSettings, dropped: Counter[str]
+) -> _Classes:
+    """Cut every segment into its obstacle piece and its ground piece, each possibly empty."""
+    start, stop = _within_range(segments, settings.max_range)
+    reached = start < stop
+    first, last = segments.height[:, 0], segments.height[:, 1]
+    over_step = segments.height - segments.tolerance
+    # Linear along the segment: above the step, below the robot's top, and within the step of 0.
+    above = _positive(over_step[:, 0], over_step[:, 1])
+    under_top = _positive(settings.robot_height - first, settings.robot_height - last)
+    over_hole = segments.height + segments.tolerance
+    over = _positive(over_hole[:, 0], over_hole[:, 1])
+    within = _positive(-over_step[:, 0], -over_step[:, 1])
+    obstacle = _intersect((start, stop), above, under_top)
+    ground = _intersect((start, stop), over, within)
+    has_obstacle = reached & (obstacle[0] <= obstacle[1])
+    has_ground = reached & (ground[0] <= ground[1])
+    is_below = reached & (np.minimum(over_hole[:, 0], over_hole[:, 1]) < 0) & ~has_ground
+    is_below &= ~has_obstacle
+    dropped["out_of_range"] += int((~reached).sum())
+    dropped["below_ground"] += int(is_below.sum())
+    dropped["overhead"] += int((reached & ~has_obstacle & ~has_ground & ~is_below).sum())
+    pieces = _pick(segments, has_obstacle).at(np.stack(obstacle, axis=1)[has_obstacle])
+    middles = segments.xy[is_below].mean(axis=1)
+    return _Classes(
+        _Heights(*(field.reshape(-1, *field.shape[2:]) for field in pieces)),
+        _sampled(_pick(segments, has_ground), np.stack(ground, axis=1)[has_ground], settings),
+        middles,
+        int((has_obstacle | has_ground).sum()),
+    )
+
+
+def _sampled(segments: _Heights, spans: Floats, settings: MapperSettings) -> _Heights:
+    """Points along ground segments, dense enough that each vouches up to the next."""
+    ends = segments.at(spans)
+    length = np.hypot(*(ends.xy[:, 1] - ends.xy[:, 0]).T)
+    counts = np.ceil(length / settings.support_width).astype(np.int64) + 1
+    rows = np.repeat(np.arange(len(counts)), counts)
+    step = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    fraction = step / np.maximum(counts[rows] - 1, 1)
+    t = spans[rows, 0] + fraction * (spans[rows, 1] - spans[rows, 0])
+    samples = _pick(segments, rows).at(t[:, None])
+    return _Heights(*(field[:, 0] for field in samples))
+
+
+def _pick(heights: _Heights, rows: Bools | Ints) -> _Heights:
+    return _Heights(*(field[rows] for field in heights))
+
+
+def _positive(at_start: Floats, at_end: Floats) -> tuple[Floats, Floats]:
+    """Return the part [t0, t1] of 0..1 where a linear function is not negative; empty: t0 > t1."""
+    slope = at_end - at_start
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = -at_start / slope
+    start = np.where(at_start >= 0, 0.0, np.where(slope > 0, root, 2.0))
+    stop = np.where(at_end >= 0, 1.0, np.where(slope < 0, root, -1.0))
+    return start, stop
+
+
+def _intersect(*spans: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    return (
+        np.maximum.reduce([span[0] for span in spans]),
+        np.minimum.reduce([span[1] for span in spans]),
+    )
+
+
+def _within_range(segments: _Heights, max_range: float) -> tuple[Floats, Floats]:
+    """Return the part [t0, t1] of 0..1 inside the circle of `max_range` around the camera."""
+    start = segments.xy[:, 0]
+    along = segments.xy[:, 1] - start
+    a = (along**2).sum(axis=1)
+    b = (start * along).sum(axis=1)
+    c = (start**2).sum(axis=1) - max_range**2
+    root = np.sqrt(np.maximum(b * b - a * c, 0.0))
+    flat = a == 0.0  # vertical segments: inside or not as a whole
+    scale = np.where(flat, 1.0, a)
+    t0 = np.where(flat, np.where(c <= 0, 0.0, 2.0), (-b - root) / scale)
+    t1 = np.where(flat, np.where(c <= 0, 1.0, -1.0), (-b + root) / scale)
+    missed = (b * b - a * c < 0) & ~flat
+    return np.maximum(t0, np.where(missed, 2.0, 0.0)), np.minimum(t1, np.where(missed, -1.0, 1.0))
