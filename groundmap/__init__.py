@@ -4,6 +4,10 @@ from groundmap.camera import StereoRig
 from groundmap.errors import GroundmapError
 from groundmap.features import Features, View
 from groundmap.grid import ConfidenceGrid
+from groundmap.ground import GroundPlane, fit_ground
+from groundmap.io import read_views, write_views
+from groundmap.mapper import GroundMapper
+from groundmap.settings import GroundSettings, MapperSettings
 from groundmap.window import CellState, GridWindow
 
 __all__ = [
@@ -11,7 +15,14 @@ __all__ = [
     "ConfidenceGrid",
     "Features",
     "GridWindow",
+    "GroundMapper",
+    "GroundPlane",
+    "GroundSettings",
     "GroundmapError",
+    "MapperSettings",
     "StereoRig",
     "View",
+    "fit_ground",
+    "read_views",
+    "write_views",
 ]

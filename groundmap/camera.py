@@ -35,7 +35,7 @@ class StereoRig:
         Principal point of the left image [px].
     baseline : float
         Distance between the cameras [m].
-    pixel_noise_px : float, default 0.25
+    pixel_noise_px : float, default 0.5
         Standard deviation of a matched pixel coordinate [px].
     T_base_camera : array_like, shape (4, 4)
         Left camera in ``base_link``. The identity, as assumed unless told, says that the poses
@@ -58,7 +58,7 @@ class StereoRig:
     cx: float
     cy: float
     baseline: float
-    pixel_noise_px: float = 0.25
+    pixel_noise_px: float = 0.5
     T_base_camera: Floats = field(default_factory=lambda: np.eye(4))
 
     def __post_init__(self) -> None:

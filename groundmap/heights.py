@@ -27,7 +27,7 @@ class FlatView(NamedTuple):
     camera_height: float  #: [m] above the ground plane
     points: Floats  #: shape (n, 2) [m, view], obstacle points and ends of obstacle segments
     covariance: Floats  #: shape (n, 2, 2) [m², view]
-    bands: Floats  #: shape (n, 2) [m], lowest and highest point of each above the ground
+    heights: Floats  #: shape (n,) [m] above the ground plane
     segments: Ints  #: shape (m, 2), rows of `points`
     supports: Floats  #: shape (k, 2) [m, view], where the ground itself was seen
     support_heights: Floats  #: shape (k,) [m]
@@ -93,15 +93,13 @@ def flatten(view: View, settings: MapperSettings) -> FlatView:
     n_points = len(obstacles[0].xy)
     ends = np.arange(n_points, n_points + len(obstacles[1].xy), dtype=np.int64)
     height = np.concatenate([part.height for part in obstacles])
-    # A point's own height is all that is known of it; the margin says what may link to it.
-    margin = 0.5 * settings.link_height
     return FlatView(
         viewpoint=T_map_camera[:2, 3],
         forward=forward,
         camera_height=float(plane.height(view.rig.T_base_camera[:3, 3])),
         points=np.concatenate([part.xy for part in obstacles]),
         covariance=np.concatenate([part.covariance for part in obstacles]),
-        bands=np.stack([height - margin, height + margin], axis=1),
+        heights=height,
         segments=ends.reshape(-1, 2),
         supports=np.concatenate([part.ground.xy for part in parts]),
         support_heights=np.concatenate([part.ground.height for part in parts]),

@@ -1,0 +1,104 @@
+"""What ONE view says: one z per cell at most, non-free before free."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from groundmap.arrays import Floats, Floats32, Ints
+from groundmap.errors import InputError
+from groundmap.grid import ConfidenceGrid
+from groundmap.heights import FlatView
+from groundmap.kernels.raster import draw_surfaces, fill_star
+from groundmap.settings import MapperSettings
+from groundmap.sight2d import SightFan
+from groundmap.surfaces import Surfaces
+from groundmap.uncertainty import MODELS
+
+MARGIN = 1  # [cells] around what is drawn, so that rounding can't push a border cell outside
+MOST_CELLS = 2**28  # a block of 1 GiB: more is a resolution in the wrong unit
+
+
+class Evidence(NamedTuple):
+    """A block of cells as one view sees them.
+
+    A block and not a list, so that a cell has one z by construction; it is as large as what the
+    view reaches and is gone once fused.
+    """
+
+    lower: Ints  #: shape (2,), cell ``[row, col]`` of the block's first entry
+    z: Floats32  #: shape (rows, cols), in [-1, 1]; 0 says nothing
+
+    def cells(self) -> Ints:
+        """Return the cells ``[row, col]`` that are spoken of, shape (n, 2)."""
+        return np.argwhere(self.z != 0) + self.lower
+
+
+def evidence_of(
+    flat: FlatView,
+    surfaces: Surfaces,
+    fan: SightFan,
+    grid: ConfidenceGrid,
+    settings: MapperSettings,
+) -> Evidence:
+    """Draw surfaces and freespace of a view into cells.
+
+    Freespace is -1 in the fan; surfaces are above 0, spread by the uncertainty model. Where both
+    fall into a cell the surface wins: letting the last ray win erases walls.
+
+    Raises
+    ------
+    InputError
+        The view reaches over more than 2**28 cells.
+    """
+    model = MODELS[settings.uncertainty]
+    to_cells = _CellsOf(flat, grid)
+    origin = to_cells(np.zeros((1, 2)))[0]
+    free, ends = to_cells(fan.free), to_cells(surfaces.ends)
+    outlines = to_cells(model.outline(surfaces.ends, surfaces.reach))
+    caps = model.caps(surfaces.reach) / grid.resolution
+    discs = surfaces.discs / grid.resolution
+    corners = [free, outlines, ends, *_around(ends, caps), *_around(ends, discs[:, None])]
+    drawn = np.concatenate([origin[None], *(array.reshape(-1, 2) for array in corners)])
+    lower = np.floor(drawn.min(axis=0)) - MARGIN
+    shape = (np.floor(drawn.max(axis=0)) - lower).astype(np.int64) + 1 + MARGIN
+    if np.prod(shape.astype(np.float64)) > MOST_CELLS:
+        raise InputError(
+            "resolution",
+            f"one that cuts a view into {MOST_CELLS} cells at most",
+            f"{grid.resolution} m, which makes {shape[1]} x {shape[0]}",
+            hint="Give a coarser resolution, or a smaller max_range [m].",
+        )
+    z = np.zeros(shape[::-1], dtype=np.float32)
+    on_surface, around = model.evidence(surfaces.reach, grid.resolution)
+    if len(free):
+        odd = np.zeros(z.shape, dtype=np.uint8)
+        free = free - lower
+        fill_star(z, odd, origin - lower, free[:, 0], free[:, 1], fan.joined)
+    draw_surfaces(z, ends - lower, outlines - lower, caps, discs, on_surface, around)
+    return Evidence(lower[::-1].astype(np.int64), z)
+
+
+def drop_off_cells(flat: FlatView, grid: ConfidenceGrid) -> Ints:
+    """Return the cells ``[row, col]`` under features below the ground, each once."""
+    cells = np.floor(_CellsOf(flat, grid)(flat.drop_offs)).astype(np.int64)
+    return np.unique(cells[:, ::-1], axis=0)
+
+
+class _CellsOf:
+    """From the frame ``view`` to cells (x along columns), unrounded."""
+
+    def __init__(self, flat: FlatView, grid: ConfidenceGrid) -> None:
+        self.flat, self.grid = flat, grid
+
+    def __call__(self, xy: Floats) -> Floats:
+        x, y = xy[..., 0], xy[..., 1]
+        cos, sin = self.flat.forward
+        turned = np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
+        cells: Floats = (self.flat.viewpoint + turned - self.grid.origin) / self.grid.resolution
+        return cells
+
+
+def _around(ends: Floats, radius: Floats) -> tuple[Floats, Floats]:
+    return ends - radius[..., None], ends + radius[..., None]

@@ -1,0 +1,102 @@
+"""The columns of feature tables: what a row of points or segments holds, in its two forms."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from groundmap.arrays import Floats
+from groundmap.camera import StereoRig
+from groundmap.errors import FileFormatError
+from groundmap.features import Features
+from groundmap.io.rows import record
+
+Kind = Literal["points", "segments"]
+KINDS: tuple[Kind, ...] = ("points", "segments")
+
+PIXEL_FIELDS = ("uL", "uR", "v")
+XYZ_FIELDS = ("x", "y", "z", "cxx", "cxy", "cxz", "cyy", "cyz", "czz")
+# Where the six numbers of a covariance stand in its 3 x 3 matrix, and the reverse.
+SYMMETRIC = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
+UPPER = np.triu_indices(3)
+LARGEST_ID = 2**53  # an archive keeps ids as float64, which counts no further
+
+
+@dataclass(frozen=True)
+class Layout:
+    """One form of one kind of table.
+
+    Parameters
+    ----------
+    fields : tuple of str
+        `PIXEL_FIELDS` [px], or `XYZ_FIELDS` [m and m², camera].
+    ends : int
+        1 for points, 2 for segments.
+
+    Examples
+    --------
+    >>> Layout(PIXEL_FIELDS, 2).columns
+    ('view', 'id', 'uL0', 'uR0', 'v0', 'uL1', 'uR1', 'v1')
+    """
+
+    fields: tuple[str, ...]
+    ends: int
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns, as in the header."""
+        suffixes = ("",) if self.ends == 1 else ("0", "1")
+        return ("view", "id", *(name + suffix for suffix in suffixes for name in self.fields))
+
+    @property
+    def row(self) -> np.dtype[Any]:
+        """Type of a row."""
+        return record(["view", "id"], self.ends * len(self.fields))
+
+    def features(self, rows: npt.NDArray[Any], rig: StereoRig) -> tuple[Features, Counter[str]]:
+        """Return the features of rows, and how many had no 3-D point, by reason."""
+        shape = (
+            (len(rows), len(self.fields)) if self.ends == 1 else (len(rows), 2, len(self.fields))
+        )
+        values, ids = rows["values"].reshape(shape), rows["id"]
+        if self.fields == PIXEL_FIELDS:
+            xyz, covariance, kept, dropped = rig.triangulate(values)
+            return Features(xyz, covariance, ids[kept]), dropped
+        # Copies, so that a view does not keep the table it came from in memory.
+        xyz, covariance = values[..., :3].copy(), values[..., 3:][..., SYMMETRIC]
+        return Features(xyz, covariance, ids.copy()), Counter()
+
+
+LAYOUTS: dict[Kind, tuple[Layout, Layout]] = {
+    "points": (Layout(PIXEL_FIELDS, 1), Layout(XYZ_FIELDS, 1)),
+    "segments": (Layout(PIXEL_FIELDS, 2), Layout(XYZ_FIELDS, 2)),
+}
+
+
+def find_layout(path: Path, kind: Kind, columns: tuple[str, ...]) -> Layout:
+    """Return the layout with these columns.
+
+    Raises
+    ------
+    FileFormatError
+        There is none.
+    """
+    for layout in LAYOUTS[kind]:
+        if layout.columns == columns:
+            return layout
+    known = " or ".join(",".join(layout.columns) for layout in LAYOUTS[kind])
+    got = ",".join(columns)
+    raise FileFormatError(path, f"the columns {known}", repr(got[:80]) if got else "none")
+
+
+def values_of(features: Features) -> Floats:
+    """Return the numbers of features in XYZ form, a row each; the upper half of a covariance."""
+    upper = features.covariance[..., UPPER[0], UPPER[1]]
+    numbers = np.concatenate([features.xyz, upper], axis=-1)
+    return numbers.reshape(len(features), math.prod(numbers.shape[1:]))

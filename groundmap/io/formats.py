@@ -1,0 +1,75 @@
+"""The formats of logs by name, and the function that finds the right one."""
+
+from __future__ import annotations
+
+from difflib import SequenceMatcher
+from os import PathLike
+from pathlib import Path
+
+from groundmap.errors import FileFormatError, InputError
+from groundmap.io.folder import FolderLog
+from groundmap.io.gtsam import GtsamLog
+from groundmap.io.log import ViewLog
+
+FORMATS: dict[str, type[ViewLog]] = {"gtsam": GtsamLog, "folder": FolderLog}
+
+
+def read_views(
+    path: str | PathLike[str],
+    *,
+    format: str | None = None,
+    poses: str | PathLike[str] | None = None,
+) -> ViewLog:
+    """Open a log of views.
+
+    Parameters
+    ----------
+    path : path
+        The folder that holds the log.
+    format : str, optional
+        A key of `FORMATS`; recognised by the folder's files unless told.
+    poses : path, optional
+        A file whose poses replace the log's, in the same world: rows of ``timestamp tx ty tz
+        qx qy qz qw``, or of an id and the 16 numbers of the transform. A GTSAM log looks them up
+        by id (the timestamps are the ids); a folder takes them row by row, timestamps being the
+        same (ids are indices of views).
+
+    Returns
+    -------
+    ViewLog
+        Sized and re-iterable; it makes one view at a time.
+
+    Raises
+    ------
+    InputError
+        A format that does not exist; those there are are listed, the nearest first.
+    FileFormatError
+        No folder, a folder of no known format, or files that do not say what theirs asks for.
+
+    Examples
+    --------
+    >>> for view in read_views("views/"):  # doctest: +SKIP
+    ...     print(len(view.points), "points seen from", view.T_map_camera[:3, 3])
+    """
+    folder = Path(path)
+    if format is not None and format not in FORMATS:
+        raise InputError("format", f"one of {', '.join(_nearest_first(format))}", repr(format))
+    if not folder.is_dir():
+        if folder.exists():
+            hint = "Give the folder that holds it."
+            raise FileFormatError(folder, "a folder of views", "a file", hint=hint)
+        raise FileFormatError(folder, "a folder of views", "nothing of that name")
+    log = FORMATS[format] if format is not None else _recognised(folder)
+    return log(folder, poses=None if poses is None else Path(poses))
+
+
+def _recognised(folder: Path) -> type[ViewLog]:
+    for log in FORMATS.values():
+        if log.recognises(folder):
+            return log
+    known = "; ".join(f"{name}: {log.looks_for}" for name, log in FORMATS.items())
+    raise FileFormatError(folder, f"the files of a known format ({known})", "none of them")
+
+
+def _nearest_first(name: str) -> list[str]:
+    return sorted(FORMATS, key=lambda known: -SequenceMatcher(None, name, known).ratio())

@@ -1,0 +1,129 @@
+"""The GTSAM visual-odometry text set.
+
+``VO_calibration.txt``
+    ``fx fy skew cx cy baseline`` [px, m], skew 0.
+``VO_camera_poses.txt``
+    ``id`` and the 16 numbers of camera to world, row by row. The world is optical: x right,
+    y down, z forward. Views come in ascending id, whatever the order of the rows.
+``VO_stereo_factors.txt``
+    ``pose_id landmark_id uL uR v X Y Z``, in any order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from groundmap.arrays import Floats, Ints
+from groundmap.camera import StereoRig
+from groundmap.errors import FileFormatError, InputError
+from groundmap.features import View
+from groundmap.frames import map_from_world
+from groundmap.io.disk_sort import sort_on_disk
+from groundmap.io.log import ViewLog
+from groundmap.io.poses import check_unique, poses_by_id, read_gtsam
+from groundmap.io.rows import Rows, read_rows, record
+
+CALIBRATION, POSES, FACTORS = (
+    "VO_calibration.txt",
+    "VO_camera_poses.txt",
+    "VO_stereo_factors.txt",
+)
+CALIBRATION_ROW = record([], 6)
+# X Y Z are read to check the row, and not used: they are the pixels triangulated with the same
+# rig, rounded to six digits and without covariance.
+FACTOR_ROW = record(["pose", "landmark"], 6)
+STORED_ROW = np.dtype([("view", np.int64), ("id", np.int64), ("pixels", np.float64, (3,))])
+
+
+class GtsamLog(ViewLog):
+    """Views of a GTSAM visual-odometry set.
+
+    All files are checked, and the factors sorted on disk, when the log is opened: iterating then
+    reads one view's rows at a time. Landmark ids become the ids of the points; a pose without
+    factors is an empty view.
+
+    Raises
+    ------
+    FileFormatError
+        Besides what the files may lack: two poses of one id, a factor of a pose there isn't.
+    """
+
+    looks_for = f"{CALIBRATION}, {POSES} and {FACTORS}"
+
+    def __init__(self, path: Path, *, poses: Path | None = None) -> None:
+        super().__init__(path, poses=poses)
+        self.rig = _read_rig(path / CALIBRATION)
+        #: Pose ids of the views, shape (n,), ascending.
+        self.ids, T_world_camera = _read_sorted_poses(path / POSES)
+        if poses is not None:
+            T_world_camera = poses_by_id(poses, self.ids)
+        self._T_map_camera = map_from_world(T_world_camera, "optical")
+        factors = _read_factors(path / FACTORS, self.ids)
+        self._factors, self._offsets = sort_on_disk(factors, len(self.ids), STORED_ROW)
+        if not len(self._factors):
+            raise FileFormatError(path / FACTORS, "at least one factor", "an empty file")
+
+    @classmethod
+    def recognises(cls, path: Path) -> bool:
+        """Return whether any of the three files is there: what is missing is said on opening."""
+        return any((path / name).is_file() for name in (CALIBRATION, POSES, FACTORS))
+
+    def __len__(self) -> int:
+        """Return the number of poses."""
+        return len(self.ids)
+
+    def __iter__(self) -> Iterator[View]:
+        """Iterate over the views in the order of the pose ids."""
+        for index, T_map_camera in enumerate(self._T_map_camera):
+            rows = self._factors[self._offsets[index] : self._offsets[index + 1]]
+            yield View.from_pixels(
+                T_map_camera, self.rig, points_px=rows["pixels"], point_ids=rows["id"]
+            )
+
+
+def _read_rig(path: Path) -> StereoRig:
+    lines = [row for rows in read_rows(path, CALIBRATION_ROW) for row in rows.values["values"]]
+    if len(lines) != 1:
+        raise FileFormatError(path, "one line: fx fy skew cx cy baseline", f"{len(lines)} lines")
+    fx, fy, skew, cx, cy, baseline = lines[0].tolist()
+    if skew != 0:
+        raise FileFormatError(path, "skew 0", str(skew), hint="Rectify the images first.")
+    try:
+        return StereoRig(fx=fx, fy=fy, cx=cx, cy=cy, baseline=baseline)
+    except InputError as error:
+        raise FileFormatError(path, f"{error.name} to be {error.expected}", error.got) from error
+
+
+def _read_sorted_poses(path: Path) -> tuple[Ints, Floats]:
+    poses = read_gtsam(path)
+    check_unique(path, poses)
+    order = np.argsort(poses.keys)
+    return poses.keys[order], poses.transforms[order]
+
+
+def _read_factors(path: Path, ids: Ints) -> Iterator[npt.NDArray[Any]]:
+    for rows in read_rows(path, FACTOR_ROW):
+        stored = np.empty(len(rows.values), dtype=STORED_ROW)
+        stored["view"] = _views_of(path, rows, ids)
+        stored["id"] = rows.values["landmark"]
+        stored["pixels"] = rows.values["values"][:, :3]
+        yield stored
+
+
+def _views_of(path: Path, rows: Rows, ids: Ints) -> Ints:
+    wanted = rows.values["pose"]
+    views = np.searchsorted(ids, wanted).clip(max=len(ids) - 1)
+    unknown = np.flatnonzero(ids[views] != wanted)
+    if len(unknown):
+        raise FileFormatError(
+            path,
+            f"the id of a pose in {POSES}",
+            str(wanted[unknown[0]]),
+            line=int(rows.lines[unknown[0]]),
+        )
+    return views

@@ -1,0 +1,90 @@
+"""Maps for Nav2's map_server: a ``.yaml`` file and a ``.pgm`` image."""
+
+from __future__ import annotations
+
+import json
+import re
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from groundmap.archive import write_atomically
+from groundmap.arrays import Bytes
+from groundmap.errors import InputError
+from groundmap.grid import ConfidenceGrid
+from groundmap.io.dense import dense_window
+from groundmap.window import CellState
+
+# Contested cells are unknown to a planner, here as everywhere.
+GREYS = {
+    CellState.UNKNOWN: 205,
+    CellState.FREE: 254,
+    CellState.NONFREE: 0,
+    CellState.CONTESTED: 205,
+}
+OCCUPIED_THRESH = 0.65
+# map_server reads grey g as occupied with probability (255 - g) / 255, and as free below this
+# threshold: 205 is 0.19608, and with the customary 0.25 all unknown space would be free.
+FREE_THRESH = 0.196
+
+
+def write_ros_map(grid: ConfidenceGrid, path: str | PathLike[str]) -> None:
+    """Write a 2-D map as ``NAME.yaml`` and ``NAME.pgm``, which map_server loads.
+
+    Occupied is 0, free 254, unknown and contested 205. Resolution and origin are written with
+    every digit: rounded to three, a hundred metres would be off by a third of one.
+
+    Parameters
+    ----------
+    grid : ConfidenceGrid
+    path : path
+        The ``.yaml`` file; the image goes beside it.
+
+    Raises
+    ------
+    InputError
+        An empty map, or a 3-D one.
+    OSError
+        The folder does not exist or can't be written to.
+    """
+    if grid.ndim != 2:
+        raise InputError("grid", "a 2-D map", f"a {grid.ndim}-D one", hint="Export it as .npz.")
+    window = dense_window(grid)
+    target = Path(path)
+    image = target.with_suffix(".pgm")
+    pgm = _pgm(window.states())
+    text = _yaml(image.name, window.resolution, window.origin.tolist())
+    # The image first: a yaml file never names one that isn't there.
+    write_atomically(image, lambda stream: stream.write(pgm))
+    write_atomically(target, lambda stream: stream.write(text.encode()))
+
+
+def _pgm(states: Bytes) -> bytes:
+    greys = np.array([GREYS[state] for state in CellState], dtype=np.uint8)
+    pixels = greys[states[::-1]]  # row 0 of an image is its top, the largest y
+    rows, cols = pixels.shape
+    return f"P5\n{cols} {rows}\n255\n".encode() + pixels.tobytes()
+
+
+def _yaml(image: str, resolution: float, origin: list[float]) -> str:
+    plain = re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]*", image)
+    x, y = map(_number, origin)
+    return "\n".join(
+        [
+            f"image: {image if plain else json.dumps(image, ensure_ascii=False)}",
+            "mode: trinary",
+            f"resolution: {_number(resolution)}",
+            f"origin: [{x}, {y}, 0]",
+            "negate: 0",
+            f"occupied_thresh: {OCCUPIED_THRESH}",
+            f"free_thresh: {FREE_THRESH}",
+            "",
+        ]
+    )
+
+
+def _number(value: float) -> str:
+    """Return every digit; YAML 1.1 takes ``1e-05`` for text, and ``1.0e-05`` for a number."""
+    text = repr(float(value))
+    return text if "." in text else text.replace("e", ".0e")

@@ -1,0 +1,147 @@
+"""Tables of numbers in text files, read in chunks; errors name the line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from itertools import islice
+from os import PathLike
+from typing import Any, NamedTuple, TextIO
+
+import numpy as np
+import numpy.typing as npt
+
+from groundmap.arrays import Ints
+from groundmap.errors import FileFormatError
+
+CHUNK_LINES = 65_536
+SHOWN_CHARACTERS = 60
+
+
+class Rows(NamedTuple):
+    """Consecutive rows of a table."""
+
+    values: npt.NDArray[Any]  #: shape (n,), of the record type that was asked for
+    lines: Ints  #: shape (n,), the one-based line each row stood on
+
+
+def record(integers: Sequence[str], numbers: int) -> np.dtype[Any]:
+    """Return the type of a row: named integer columns, then so many float64 ``values``.
+
+    Integers are kept apart because ids may use all of their 64 bits, which a float would round.
+
+    Examples
+    --------
+    >>> record(["view", "id"], 3).names
+    ('view', 'id', 'values')
+    """
+    return np.dtype([*((name, np.int64) for name in integers), ("values", np.float64, (numbers,))])
+
+
+@contextmanager
+def opened(path: str | PathLike[str]) -> Iterator[TextIO]:
+    """Open a text file, whatever bytes it holds; a byte order mark is passed over.
+
+    Raises
+    ------
+    FileFormatError
+        There is no such file, or it can't be read.
+    """
+    try:
+        with open(path, encoding="utf-8-sig", errors="replace") as stream:
+            yield stream
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise FileFormatError(path, "a readable file", reason) from error
+
+
+def read_rows(
+    path: str | PathLike[str],
+    row: np.dtype[Any],
+    *,
+    delimiter: str | None = None,
+    header: bool = False,
+) -> Iterator[Rows]:
+    """Iterate over the rows of a table, a chunk at a time.
+
+    Parameters
+    ----------
+    path : path
+        Blank lines, and what follows a ``#``, are passed over.
+    row : dtype
+        Type of a row, see `record`.
+    delimiter : str, optional
+        What separates columns; any white space unless told.
+    header : bool, default False
+        Whether the first line names the columns, and is no row.
+
+    Raises
+    ------
+    FileFormatError
+        A line with another number of columns, or one that is not a number.
+    """
+    with opened(path) as stream:
+        first = 1
+        if header:
+            stream.readline()
+            first = 2
+        while lines := list(islice(stream, CHUNK_LINES)):
+            text = [line.partition("#")[0].strip() for line in lines]
+            filled = np.array([bool(line) for line in text])
+            numbers = first + np.flatnonzero(filled)
+            first += len(lines)
+            if filled.any():
+                kept = [line for line in text if line]
+                yield Rows(_parse(path, kept, numbers, row, delimiter), numbers)
+
+
+def _parse(
+    path: str | PathLike[str],
+    text: list[str],
+    lines: Ints,
+    row: np.dtype[Any],
+    delimiter: str | None,
+) -> npt.NDArray[Any]:
+    try:
+        return _numbers(text, row, delimiter)
+    except ValueError as error:
+        raise _offence(path, text, lines, row, delimiter) from error
+
+
+def _numbers(text: list[str], row: np.dtype[Any], delimiter: str | None) -> npt.NDArray[Any]:
+    parsed: npt.NDArray[Any] = np.loadtxt(
+        text, dtype=row, comments=None, delimiter=delimiter, ndmin=1
+    )
+    return parsed
+
+
+def _offence(
+    path: str | PathLike[str],
+    text: list[str],
+    lines: Ints,
+    row: np.dtype[Any],
+    delimiter: str | None,
+) -> FileFormatError:
+    """Find the first line that does not parse: slow, and only done when one is known to be."""
+    first = next(i for i, line in enumerate(text) if not _parses(line, row, delimiter))
+    line, integers = text[first], len(row.names or ()) - 1
+    expected, found = integers + row["values"].shape[0], len(line.split(delimiter))
+    if found != expected:
+        return FileFormatError(
+            path,
+            f"{expected} columns",
+            str(found),
+            line=int(lines[first]),
+            hint="Was the file cut short?" if found < expected else "",
+        )
+    leading = f", the first {integers} integers" if integers else ""
+    shown = repr(line[:SHOWN_CHARACTERS])
+    return FileFormatError(path, f"{expected} numbers{leading}", shown, line=int(lines[first]))
+
+
+def _parses(line: str, row: np.dtype[Any], delimiter: str | None) -> bool:
+    try:
+        _numbers([line], row, delimiter)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,128 @@
+"""Which of many straight edges is nearest (or farthest) at each bearing, all at once.
+
+Seen from the origin, an edge has at bearing t the inverse range a cos t + b sin t: two edges meet
+at most once, so the nearest edges are an upper envelope, merged pairwise in O(n log n).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from groundmap.arrays import Floats, Ints
+
+NO_EDGE = -1
+
+
+@njit(cache=True, nogil=True)
+def upper_envelope(t0: Floats, t1: Floats, a: Floats, b: Floats) -> tuple[Floats, Floats, Ints]:
+    """Return (lower bearing, upper bearing, edge) of the pieces of the maximum, in order.
+
+    Edge i spans the bearings t0[i] < t1[i], less than a half turn, with a[i] cos t + b[i] sin t.
+    """
+    count = t0.size
+    low, high = t0.copy(), t1.copy()
+    edge = np.arange(count)
+    first = np.arange(count + 1)  # envelope e holds the pieces first[e] to first[e + 1]
+    while first.size > 2:
+        pairs = first.size // 2  # envelopes come in pairs; an odd one is carried over
+        room = 4 * low.size + 4
+        new_low, new_high = np.empty(room), np.empty(room)
+        new_edge, new_first = np.empty(room, np.int64), np.zeros(pairs + 1, np.int64)
+        size = 0
+        for pair in range(pairs):
+            i0, i1 = first[2 * pair], first[2 * pair + 1]
+            j1 = first[min(2 * pair + 2, first.size - 1)]
+            size = _merge(
+                low, high, edge, i0, i1, j1, a, b, new_low, new_high, new_edge, size
+            )
+            new_first[pair + 1] = size
+        low, high, edge = new_low[:size], new_high[:size], new_edge[:size]
+        first = new_first
+    return low, high, edge
+
+
+@njit(cache=True, nogil=True)
+def _merge(low, high, edge, i, i1, j1, a, b, new_low, new_high, new_edge, size):  # type: ignore[no-untyped-def]
+    """Merge the envelopes i..i1 and i1..j1 into the new arrays from `size` on."""
+    j, start, here = i1, size, -np.inf
+    while i < i1 or j < j1:
+        at_i = max(low[i], here) if i < i1 else np.inf
+        at_j = max(low[j], here) if j < j1 else np.inf
+        if at_i < at_j:  # only the first envelope speaks, up to where the second begins
+            here = min(high[i], at_j)
+            size = _append(at_i, here, edge[i], new_low, new_high, new_edge, start, size)
+        elif at_j < at_i:
+            here = min(high[j], at_i)
+            size = _append(at_j, here, edge[j], new_low, new_high, new_edge, start, size)
+        else:
+            here = min(high[i], high[j])
+            size = _append_higher(
+                at_i, here, edge[i], edge[j], a, b, new_low, new_high, new_edge, start, size
+            )
+        if i < i1 and high[i] <= here:
+            i += 1
+        if j < j1 and high[j] <= here:
+            j += 1
+    return size
+
+
+@njit(cache=True, nogil=True)
+def _append(lower, upper, edge, low, high, edges, start, size):  # type: ignore[no-untyped-def]
+    """Append a piece, or lengthen the last one if it goes on."""
+    if upper <= lower:
+        return size
+    if size > start and edges[size - 1] == edge and high[size - 1] == lower:
+        high[size - 1] = upper
+        return size
+    low[size], high[size], edges[size] = lower, upper, edge
+    return size + 1
+
+
+@njit(cache=True, nogil=True)
+def _append_higher(lower, upper, i, j, a, b, low, high, edges, start, size):  # type: ignore[no-untyped-def]
+    """Append the higher of two edges, and the other one behind their crossing, if they cross."""
+    da, db = a[i] - a[j], b[i] - b[j]
+    at_lower = da * np.cos(lower) + db * np.sin(lower)
+    at_upper = da * np.cos(upper) + db * np.sin(upper)
+    if (at_lower < 0.0) != (at_upper < 0.0) and at_lower != 0.0 and at_upper != 0.0:
+        crossing = np.arctan2(-da, db)
+        if crossing < lower:
+            crossing += np.pi
+        elif crossing > upper:
+            crossing -= np.pi
+        if lower < crossing < upper:
+            first, second = (i, j) if at_lower > 0.0 else (j, i)
+            size = _append(lower, crossing, first, low, high, edges, start, size)
+            return _append(crossing, upper, second, low, high, edges, start, size)
+    middle = 0.5 * (lower + upper)
+    higher = i if da * np.cos(middle) + db * np.sin(middle) >= 0.0 else j
+    return _append(lower, upper, higher, low, high, edges, start, size)
+
+
+@njit(cache=True, nogil=True)
+def fill_gaps(low, high, edge, gap_low, gap_high, gap_edge):  # type: ignore[no-untyped-def]
+    """Put pieces of a second envelope where the first has none.
+
+    Returns (lower bearing, upper bearing, edge, from the second envelope), in order.
+    """
+    room = 2 * (low.size + gap_low.size) + 2
+    out_low, out_high = np.empty(room), np.empty(room)
+    out_edge, second = np.empty(room, np.int64), np.zeros(room, np.bool_)
+    size, j, here = 0, 0, -np.inf
+    for i in range(low.size + 1):
+        until = low[i] if i < low.size else np.inf
+        while j < gap_low.size and gap_low[j] < until:
+            lower, upper = max(gap_low[j], here), min(gap_high[j], until)
+            if lower < upper:
+                out_low[size], out_high[size], out_edge[size] = lower, upper, gap_edge[j]
+                second[size] = True
+                size += 1
+            if gap_high[j] > until:
+                break
+            j += 1
+        if i < low.size:
+            out_low[size], out_high[size], out_edge[size] = low[i], high[i], edge[i]
+            size += 1
+            here = high[i]
+    return out_low[:size], out_high[:size], out_edge[:size], second[:size]

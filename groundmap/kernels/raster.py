@@ -1,0 +1,154 @@
+"""Drawing into a dense block of cells; coordinates are in cells, x along columns, y along rows.
+
+A cell is inside a polygon if its centre is; borders are half-open, so that polygons that share a
+border share no cell and leave none out. A line touches every cell that it passes through.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from groundmap.arrays import Bools, Bytes, Floats, Floats32
+
+FREE = np.float32(-1.0)
+
+
+@njit(cache=True, nogil=True)
+def fill_star(
+    z: Floats32, odd: Bytes, origin: Floats, start: Floats, end: Floats, joined: Bools
+) -> None:
+    """Set to -1 the cells of a star polygon, in one parity pass.
+
+    The polygon runs start[0], end[0], start[1], ..., and through `origin` where a piece is not
+    joined to the next. `odd` is a block of zeros of z's shape; it is used up.
+    """
+    count = len(start)
+    for i in range(count):
+        following = start[i + 1 if i + 1 < count else 0]
+        _flip_right_of(odd, start[i], end[i])
+        if joined[i]:
+            _flip_right_of(odd, end[i], following)
+        else:
+            _flip_right_of(odd, end[i], origin)
+            _flip_right_of(odd, origin, following)
+    for row in range(z.shape[0]):
+        inside = np.uint8(0)
+        for col in range(z.shape[1]):
+            inside ^= odd[row, col]
+            if inside:
+                z[row, col] = FREE
+
+
+@njit(cache=True, nogil=True)
+def _flip_right_of(odd, p, q):  # type: ignore[no-untyped-def]
+    """Flip, in each row that the edge p-q spans, the first cell whose centre is right of it."""
+    if p[1] > q[1]:
+        p, q = q, p
+    first, last = _first_centre(p[1]), _first_centre(q[1])
+    if first >= last:
+        return
+    slope = (q[0] - p[0]) / (q[1] - p[1])
+    for row in range(max(first, 0), min(last, odd.shape[0])):
+        col = max(_first_centre(p[0] + (row + 0.5 - p[1]) * slope), 0)
+        if col < odd.shape[1]:
+            odd[row, col] ^= np.uint8(1)
+
+
+@njit(cache=True, nogil=True)
+def _first_centre(coordinate):  # type: ignore[no-untyped-def]
+    """Return the first cell whose centre is at or after a coordinate."""
+    return int(np.ceil(coordinate - 0.5))
+
+
+@njit(cache=True, nogil=True)
+def draw_surfaces(
+    z: Floats32,
+    ends: Floats,
+    outlines: Floats,
+    caps: Floats,
+    discs: Floats,
+    on_surface: Floats,
+    around: Floats,
+) -> None:
+    """Raise z to what each surface says: on it, and in the spread around it.
+
+    Non-free evidence wins over free, and the surer over the less sure: z is a maximum.
+    """
+    for i in range(len(ends)):
+        spread = np.float32(around[i])
+        _fill_quadrangle(z, outlines[i], spread)
+        _draw_line(z, outlines[i, 0], outlines[i, 3], spread)
+        _draw_line(z, outlines[i, 1], outlines[i, 2], spread)
+        for side in range(2):
+            if caps[i, side] > 0.0:
+                _fill_disc(z, ends[i, side], caps[i, side], spread)
+        surface = np.float32(on_surface[i])
+        if discs[i] > 0.0:
+            middle = 0.5 * (ends[i, 0] + ends[i, 1])
+            _fill_disc(z, middle, discs[i], surface)
+            _draw_line(z, middle, middle, surface)
+        else:
+            _draw_line(z, ends[i, 0], ends[i, 1], surface)
+
+
+@njit(cache=True, nogil=True)
+def _fill_quadrangle(z, corners, value):  # type: ignore[no-untyped-def]
+    lowest, highest = corners[:, 1].min(), corners[:, 1].max()
+    crossings = np.empty(4)
+    for row in range(max(_first_centre(lowest), 0), min(_first_centre(highest), z.shape[0])):
+        count = 0
+        for i in range(4):
+            p, q = corners[i], corners[(i + 1) % 4]
+            if p[1] > q[1]:
+                p, q = q, p
+            if p[1] <= row + 0.5 < q[1]:
+                slope = (q[0] - p[0]) / (q[1] - p[1])
+                crossings[count] = p[0] + (row + 0.5 - p[1]) * slope
+                count += 1
+        crossings[:count].sort()
+        for pair in range(0, count - 1, 2):
+            left = max(_first_centre(crossings[pair]), 0)
+            right = min(_first_centre(crossings[pair + 1]), z.shape[1])
+            for col in range(left, right):
+                z[row, col] = max(z[row, col], value)
+
+
+@njit(cache=True, nogil=True)
+def _fill_disc(z, centre, radius, value):  # type: ignore[no-untyped-def]
+    for row in range(
+        max(_first_centre(centre[1] - radius), 0),
+        min(_first_centre(centre[1] + radius) + 1, z.shape[0]),
+    ):
+        dy = row + 0.5 - centre[1]
+        for col in range(
+            max(_first_centre(centre[0] - radius), 0),
+            min(_first_centre(centre[0] + radius) + 1, z.shape[1]),
+        ):
+            dx = col + 0.5 - centre[0]
+            if dx * dx + dy * dy <= radius * radius:
+                z[row, col] = max(z[row, col], value)
+
+
+@njit(cache=True, nogil=True)
+def _draw_line(z, p, q, value):  # type: ignore[no-untyped-def]
+    """Visit the cells from p to q in order (Amanatides and Woo 1987)."""
+    col, row = int(np.floor(p[0])), int(np.floor(p[1]))
+    last_col, last_row = int(np.floor(q[0])), int(np.floor(q[1]))
+    dx, dy = q[0] - p[0], q[1] - p[1]
+    step_x, step_y = (1 if dx > 0 else -1), (1 if dy > 0 else -1)
+    # Share of the line at the next border in x and y, and from one border to the next.
+    next_x = ((col + (dx > 0)) - p[0]) / dx if dx != 0.0 else np.inf
+    next_y = ((row + (dy > 0)) - p[1]) / dy if dy != 0.0 else np.inf
+    each_x = abs(1.0 / dx) if dx != 0.0 else np.inf
+    each_y = abs(1.0 / dy) if dy != 0.0 else np.inf
+    # The number of borders is known beforehand, so rounding can't make the walk miss its end.
+    for _ in range(abs(last_col - col) + abs(last_row - row) + 1):
+        if 0 <= row < z.shape[0] and 0 <= col < z.shape[1]:
+            z[row, col] = max(z[row, col], value)
+        if col != last_col and (next_x < next_y or row == last_row):
+            col += step_x
+            next_x += each_x
+        else:
+            row += step_y
+            next_y += each_y

@@ -1,0 +1,201 @@
+"""What bounds freespace in one view: segments, believed links, and the discs of lone points."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from groundmap.arrays import Bools, Bytes, Floats, Ints
+from groundmap.heights import FlatView
+from groundmap.settings import MapperSettings
+from groundmap.triangulation import Mesh
+from groundmap.uncertainty import MODELS
+
+RADIAL = 1e-9  # [rad], an edge that spans less is seen end-on
+SHARE_OF_FOOTPRINT = 0.8  # a link shorter than this share of the narrowest robot stops that robot
+
+
+class SurfaceKind(IntEnum):
+    """Why something is a surface."""
+
+    SEGMENT = 0
+    LINK = 1
+    LONE = 2
+
+
+class Surfaces(NamedTuple):
+    """Surfaces of one view, each a straight piece; shape (s, ...)."""
+
+    ends: Floats  #: shape (s, 2, 2) [m, view], counter-clockwise around the viewpoint
+    reach: Floats  #: shape (s, 2) [m], how far freespace ends before it
+    tops: Floats  #: shape (s, 2) [m] above the ground
+    kind: Bytes  #: shape (s,), `SurfaceKind`
+    discs: Floats  #: shape (s,) [m], radius of a lone point's disc; 0 for the others
+    frontiers: Floats  #: shape (f, 2, 2) [m, view], links too long to believe
+    through_viewpoint: int  #: edges dropped because they lie within `min_range`
+
+
+class _Vertices(NamedTuple):
+    """Mesh vertices, or places on edges, with what is known of them; shape (n, ...)."""
+
+    xy: Floats
+    low: Floats
+    high: Floats
+    sigma: Floats  # [m], as the uncertainty model has it
+
+
+class _Pieces(NamedTuple):
+    """Pieces of edges: vertex numbers, shape (k, 2), and where on the edge, 0 to 1."""
+
+    edges: Ints
+    span: Floats
+
+    def at(self, vertices: _Vertices) -> _Vertices:
+        """Interpolate between the edge's vertices; fields get the shape (k, 2, ...)."""
+
+        def blend(values: Floats) -> Floats:
+            weight = self.span.reshape(*self.span.shape, *(1,) * (values.ndim - 1))
+            first, last = values[self.edges[:, :1]], values[self.edges[:, 1:]]
+            # At 0 and 1 this gives the vertex itself, without rounding.
+            blended: Floats = first * (1.0 - weight) + last * weight
+            return blended
+
+        return _Vertices(*(blend(values) for values in vertices))
+
+
+def find_surfaces(flat: FlatView, mesh: Mesh, settings: MapperSettings) -> Surfaces:
+    """Tell which edges of the triangulation are surfaces.
+
+    Segments are. Links between neighbouring features are, up to a length of
+    min(max(link_length, link_angle r), 0.8 narrowest_footprint), r the range of the nearer end, if
+    the features' height bands overlap. A vertex with neither is a disc of max(cell / 2, sigma).
+    All other edges are frontiers: they bound nothing and grant nothing.
+    """
+    vertices = _vertices(flat, mesh, settings)
+    believed = mesh.constrained | _believed(vertices, mesh.edges, settings)
+    pieces, constrained, blocked = _away_from_viewpoint(
+        vertices.xy, mesh.edges[believed], mesh.constrained[believed], settings.min_range
+    )
+    ends = pieces.at(vertices)
+    discs = _discs(vertices, mesh.edges[believed], ends)
+    radius = np.maximum(0.5 * settings.resolution, discs.sigma)
+    everything = np.concatenate([ends.xy, _silhouettes(discs.xy, radius)])
+    reach = settings.spread_sigmas * np.concatenate([ends.sigma, _twice(discs.sigma)])
+    tops = np.concatenate([ends.high, _twice(discs.high)])
+    kind = np.concatenate(
+        [
+            np.where(constrained, SurfaceKind.SEGMENT, SurfaceKind.LINK),
+            np.full(len(radius), SurfaceKind.LONE),
+        ]
+    )
+    clockwise = _cross(everything[:, 0], everything[:, 1]) < 0
+    for pairs in (everything, reach, tops):
+        pairs[clockwise] = pairs[clockwise, ::-1]
+    return Surfaces(
+        ends=everything,
+        reach=reach,
+        tops=tops,
+        kind=kind.astype(np.uint8),
+        discs=np.concatenate([np.zeros(len(ends.xy)), radius]),
+        frontiers=vertices.xy[mesh.edges[~believed]],
+        through_viewpoint=blocked,
+    )
+
+
+def _vertices(flat: FlatView, mesh: Mesh, settings: MapperSettings) -> _Vertices:
+    """Carry the features' heights and covariances over to the mesh's vertices.
+
+    A vertex of several features takes the band that spans them, and the widest covariance; one
+    where segments cross takes what they have there.
+    """
+    count = len(mesh.points)
+    low, high = np.full(count, np.inf), np.full(count, -np.inf)
+    np.minimum.at(low, mesh.source, flat.heights)
+    np.maximum.at(high, mesh.source, flat.heights)
+    covariance = np.zeros((count, 2, 2))
+    widest = np.argsort(np.trace(flat.covariance, axis1=1, axis2=2), kind="stable")
+    covariance[mesh.source[widest]] = flat.covariance[widest]
+    for vertex, a, b in mesh.crossings.tolist():
+        length = np.hypot(*(mesh.points[b] - mesh.points[a]))
+        t = min(1.0, float(np.hypot(*(mesh.points[vertex] - mesh.points[a])) / length))
+        low[vertex] = min(low[vertex], (1 - t) * low[a] + t * low[b])
+        high[vertex] = max(high[vertex], (1 - t) * high[a] + t * high[b])
+        covariance[vertex] = (1 - t) * covariance[a] + t * covariance[b]
+    sigma = MODELS[settings.uncertainty].sigma(mesh.points, covariance)
+    return _Vertices(mesh.points, low, high, sigma)
+
+
+def _believed(vertices: _Vertices, edges: Ints, settings: MapperSettings) -> Bools:
+    a, b = edges[:, 0], edges[:, 1]
+    length = np.hypot(*(vertices.xy[b] - vertices.xy[a]).T)
+    nearer = np.hypot(*vertices.xy.T)[edges].min(axis=1)
+    longest = np.minimum(
+        np.maximum(settings.link_length, settings.link_angle * nearer),
+        SHARE_OF_FOOTPRINT * settings.narrowest_footprint,
+    )
+    apart = np.maximum(vertices.low[a], vertices.low[b]) - np.minimum(
+        vertices.high[a], vertices.high[b]
+    )
+    believed: Bools = (length <= longest) & (apart <= settings.link_height)
+    return believed
+
+
+def _away_from_viewpoint(
+    xy: Floats, edges: Ints, constrained: Bools, min_range: float
+) -> tuple[_Pieces, Bools, int]:
+    """Clip edges to the outside of the circle of `min_range`; count those that lie inside."""
+    start, along = xy[edges[:, 0]], xy[edges[:, 1]] - xy[edges[:, 0]]
+    a, b = (along**2).sum(axis=1), (start * along).sum(axis=1)
+    c = (start**2).sum(axis=1) - min_range**2
+    root = np.sqrt(np.maximum(b * b - a * c, 0.0))
+    enters, leaves = np.clip((-b - root) / a, 0.0, 1.0), np.clip((-b + root) / a, 0.0, 1.0)
+    missed = (b * b - a * c <= 0) | (enters >= leaves)
+    rows = np.arange(len(edges))
+    before, after = ~missed & (enters > 0), ~missed & (leaves < 1)
+    number = np.concatenate([rows[missed], rows[before], rows[after]])
+    span = np.concatenate(
+        [
+            np.tile([0.0, 1.0], (int(missed.sum()), 1)),
+            np.stack([np.zeros(before.sum()), enters[before]], axis=1),
+            np.stack([leaves[after], np.ones(after.sum())], axis=1),
+        ]
+    )
+    blocked = int((~missed & ~before & ~after).sum())
+    return _Pieces(edges[number], span), constrained[number], blocked
+
+
+def _discs(vertices: _Vertices, edges: Ints, ends: _Vertices) -> _Vertices:
+    """Return the lone vertices, and the nearer ends of edges that are seen end-on.
+
+    Seen end-on, an edge covers no bearing, so it counts by its nearer end.
+    """
+    lone = np.ones(len(vertices.xy), dtype=np.bool_)
+    lone[edges] = False
+    first, last = ends.xy[:, 0], ends.xy[:, 1]
+    angle = np.arctan2(np.abs(_cross(first, last)), (first * last).sum(axis=1))
+    radial = np.flatnonzero(angle < RADIAL)
+    nearer = np.hypot(*np.moveaxis(ends.xy[radial], -1, 0)).argmin(axis=1)
+    return _Vertices(
+        *(
+            np.concatenate([values[lone], pairs[radial, nearer]])
+            for values, pairs in zip(vertices, ends, strict=True)
+        )
+    )
+
+
+def _silhouettes(xy: Floats, radius: Floats) -> Floats:
+    """Return what a disc hides, shape (n, 2, 2): its diameter across the line of sight."""
+    ray = xy / np.hypot(xy[:, 0], xy[:, 1])[:, None]
+    side = np.stack([-ray[:, 1], ray[:, 0]], axis=1) * radius[:, None]
+    return np.stack([xy - side, xy + side], axis=1)
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    cross: Floats = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return cross
+
+
+def _twice(values: Floats) -> Floats:
+    return np.stack([values, values], axis=1)

@@ -1,0 +1,105 @@
+"""Uncertainty models: over which cells a surface spreads, by name (paper, section 6.2)."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from groundmap.arrays import Floats
+
+
+class Ellipsoid:
+    """The third solution of the paper: a constant-density ellipse along the feature's covariance.
+
+    The surface itself keeps z = 1; around it, z is such that a ray through the spread adds up to
+    one cell of surface.
+    """
+
+    name: ClassVar[str] = "ellipsoid"
+
+    def sigma(self, xy: Floats, covariance: Floats) -> Floats:
+        """Return the standard deviation of each feature along the line of sight, shape (n,) [m].
+
+        Parameters
+        ----------
+        xy : ndarray, shape (n, 2) [m, view]
+        covariance : ndarray, shape (n, 2, 2) [m², view]
+        """
+        ray = _unit(xy)
+        sigma: Floats = np.sqrt(np.einsum("ni,nij,nj->n", ray, covariance, ray))
+        return sigma
+
+    def outline(self, ends: Floats, reach: Floats) -> Floats:
+        """Return the quadrangle that a surface spreads over, shape (s, 4, 2) [m, view].
+
+        Parameters
+        ----------
+        ends : ndarray, shape (s, 2, 2) [m, view]
+        reach : ndarray, shape (s, 2) [m]
+        """
+        return _quadrangle(ends, _unit(ends) * reach[..., None])
+
+    def caps(self, reach: Floats) -> Floats:
+        """Return the radius of the disc at each end, shape (s, 2) [m]; 0 for none."""
+        return np.zeros_like(reach)
+
+    def evidence(self, reach: Floats, resolution: float) -> tuple[Floats, Floats]:
+        """Return z on the surface and in the spread around it, shape (s,) each."""
+        return np.ones(len(reach)), _constant_density(reach, resolution)
+
+
+class Radius(Ellipsoid):
+    """The second solution: a radius of certainty, the same in all directions."""
+
+    name: ClassVar[str] = "radius"
+
+    def sigma(self, xy: Floats, covariance: Floats) -> Floats:
+        """Return the standard deviation in each feature's least certain direction [m]."""
+        sigma: Floats = np.sqrt(np.linalg.eigvalsh(covariance)[:, -1])
+        return sigma
+
+    def outline(self, ends: Floats, reach: Floats) -> Floats:
+        """Return the quadrangle across the surface, shape (s, 4, 2) [m, view]."""
+        along = _unit(ends[:, 1] - ends[:, 0])
+        across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+        return _quadrangle(ends, across[:, None, :] * reach[..., None])
+
+    def caps(self, reach: Floats) -> Floats:
+        """Return the radius of the disc at each end, shape (s, 2) [m]."""
+        return reach
+
+    def evidence(self, reach: Floats, resolution: float) -> tuple[Floats, Floats]:
+        """Return z on the surface and around it, the same by the definition of this model."""
+        density = _constant_density(reach, resolution)
+        return density, density
+
+
+class Exact(Ellipsoid):
+    """The first solution: no spread; over many views the places average out."""
+
+    name: ClassVar[str] = "none"
+
+    def sigma(self, xy: Floats, covariance: Floats) -> Floats:
+        """Return zeros: every feature is taken to be where it was measured."""
+        return np.zeros(len(xy))
+
+
+MODELS: dict[str, Ellipsoid] = {model.name: model for model in (Ellipsoid(), Radius(), Exact())}
+
+
+def _constant_density(reach: Floats, resolution: float) -> Floats:
+    spread = 2.0 * reach.mean(axis=1)
+    density: Floats = resolution / np.maximum(spread, resolution)
+    return density
+
+
+def _quadrangle(ends: Floats, offset: Floats) -> Floats:
+    near, far = ends - offset, ends + offset
+    return np.stack([near[:, 0], near[:, 1], far[:, 1], far[:, 0]], axis=1)
+
+
+def _unit(vectors: Floats) -> Floats:
+    length = np.hypot(vectors[..., 0], vectors[..., 1])[..., None]
+    unit: Floats = vectors / np.where(length > 0, length, 1.0)
+    return unit
