@@ -4,7 +4,8 @@ from groundmap.camera import StereoRig
 from groundmap.errors import GroundmapError
 from groundmap.features import Features, View
 from groundmap.grid import ConfidenceGrid
-from groundmap.ground import GroundPlane, fit_ground
+from groundmap.ground import GroundPlane
+from groundmap.ground_fit import fit_ground
 from groundmap.io import read_views, write_views
 from groundmap.mapper import GroundMapper
 from groundmap.settings import GroundSettings, MapperSettings

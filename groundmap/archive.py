@@ -65,7 +65,8 @@ def read_archive(
         Missing, no archive, truncated, of another format or of a newer version.
     """
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        # Opened here: np.load leaves a broken archive's file open.
+        with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         header = json.loads(str(arrays.pop("header")))
     except FileNotFoundError as error:
@@ -86,3 +87,20 @@ def read_archive(
             hint="Upgrade groundmap.",
         )
     return header, arrays
+
+
+def check_writable(path: str | PathLike[str]) -> None:
+    """Check that a file can be written there, before the work whose result it is to hold.
+
+    Raises
+    ------
+    FileFormatError
+        The folder does not exist, or the path is a folder itself.
+    """
+    target = Path(path)
+    if target.is_dir():
+        raise FileFormatError(target, "a file name", "a folder")
+    if not target.parent.is_dir():
+        raise FileFormatError(
+            target, "a file in a folder that exists", f"no folder {target.parent}"
+        )

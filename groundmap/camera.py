@@ -74,13 +74,17 @@ class StereoRig:
         )
 
     @property
+    def is_mounted(self) -> bool:
+        """Whether the poses are a base's that carries the camera, not the camera's own."""
+        return not np.array_equal(self.T_base_camera, np.eye(4))
+
+    @property
     def up(self) -> Floats:
         """Direction of up, shape (3,) [base_link].
 
         z where the camera is mounted on a base; -y where the poses are the camera's own.
         """
-        mounted = not np.array_equal(self.T_base_camera[:3, :3], np.eye(3))
-        return np.array([0.0, 0.0, 1.0]) if mounted else np.array([0.0, -1.0, 0.0])
+        return np.array([0.0, 0.0, 1.0]) if self.is_mounted else np.array([0.0, -1.0, 0.0])
 
     def triangulate(self, pixels: npt.ArrayLike) -> Triangulated:
         """Return the 3-D points of matched pixels, dropping those that have none.
@@ -104,11 +108,11 @@ class StereoRig:
         ends = array.ndim == 3
         array = as_floats("pixels", array, (None, 2, 3) if ends else (None, 3))
         rows = array.reshape(len(array), 2 if ends else 1, 3)
-        finite = np.isfinite(rows).all(axis=(1, 2))
+        finite: Bools = np.logical_and.reduce(np.isfinite(rows), axis=(1, 2))
         with np.errstate(invalid="ignore"):
             disparity_px = rows[:, :, 0] - rows[:, :, 1]
-            visible = (disparity_px > 0).all(axis=1)
-        kept = finite & visible
+            visible: Bools = np.logical_and.reduce(disparity_px > 0, axis=1)
+        kept: Bools = finite & visible
         dropped = Counter(
             {
                 "not_finite": int((~finite).sum()),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import Floats, Ints, as_floats
+from groundmap.arrays import Bools, Floats, Ints, as_floats
 from groundmap.camera import StereoRig
 from groundmap.errors import InputError
 from groundmap.frames import check_transform
@@ -122,10 +122,10 @@ class View:
         for name in ("points", "segments"):
             features: Features = getattr(self, name)
             axes = tuple(range(1, features.xyz.ndim))
-            finite = np.isfinite(features.xyz).all(axis=axes)
+            finite: Bools = np.logical_and.reduce(np.isfinite(features.xyz), axis=axes)
             finite &= np.isfinite(features.covariance).all(axis=(*axes, axes[-1] + 1))
             with np.errstate(invalid="ignore"):
-                ahead = (features.xyz[..., 2] > 0).all(axis=axes[:-1])
+                ahead: Bools = np.logical_and.reduce(features.xyz[..., 2] > 0, axis=axes[:-1])
             if not (finite & ahead).all():
                 dropped["not_finite"] += int((~finite).sum())
                 dropped["behind_camera"] += int((finite & ~ahead).sum())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from os import PathLike
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,18 +13,10 @@ from groundmap.archive import read_archive, write_archive
 from groundmap.arrays import Counts, Floats, Floats32, Ints, as_floats, check_finite
 from groundmap.errors import FileFormatError, InputError, MergeError
 from groundmap.fusion import Average, UpdateRule, rule_from
+from groundmap.tiles import LAYERS, TILE_SHAPES, Index, Tile, Tiles
 from groundmap.window import CellState, GridWindow, cells_of
 
-TILE_SHAPES = {2: (64, 64), 3: (16, 16, 16)}
 FORMAT, VERSION = "groundmap-grid", 1
-
-
-class Tile(NamedTuple):
-    """One tile's arrays, each of the grid's tile shape."""
-
-    confidence: Floats32
-    count: Counts
-    drop_offs: Counts  #: views that saw ground below the ground plane here
 
 
 class ConfidenceGrid:
@@ -70,8 +62,7 @@ class ConfidenceGrid:
         self.origin = as_floats("origin", origin, (len(origin),))
         check_finite("origin", self.origin)
         self.frame, self.rule = frame, rule or Average()
-        self.tile_shape = TILE_SHAPES[len(origin)]
-        self._tiles: dict[tuple[int, ...], Tile] = {}
+        self._tiles = Tiles(len(origin))
         #: Base poses the map was seen from, shape (n, 3): x, y [m], yaw [rad], frame map.
         self.trajectory: Floats = np.empty((0, 3))
 
@@ -81,50 +72,46 @@ class ConfidenceGrid:
         return len(self.origin)
 
     @property
+    def tile_shape(self) -> tuple[int, ...]:
+        """Cells of a tile along each axis."""
+        return self._tiles.shape
+
+    @property
     def nbytes(self) -> int:
         """Memory held by the tiles [bytes]."""
-        return sum(array.nbytes for tile in self._tiles.values() for array in tile)
+        return self._tiles.nbytes
 
-    def tile(self, index: tuple[int, ...]) -> Tile:
+    def tile(self, index: Index) -> Tile:
         """Return the tile of that index, allocated on first touch."""
-        if index not in self._tiles:
-            self._tiles[index] = Tile(
-                np.zeros(self.tile_shape, dtype=np.float32),
-                np.zeros(self.tile_shape, dtype=np.uint32),
-                np.zeros(self.tile_shape, dtype=np.uint32),
-            )
-        return self._tiles[index]
+        return self._tiles.touch(index)
 
-    def tiles(self) -> Iterator[tuple[tuple[int, ...], Tile]]:
+    def tiles(self) -> Iterator[tuple[Index, Tile]]:
         """Iterate over (index, tile) in the order of the indices."""
-        for index in sorted(self._tiles):
-            yield index, self._tiles[index]
+        return self._tiles.items()
 
     def confidence_at(self, xy: npt.ArrayLike) -> float | Floats32:
         """Return the confidence at map positions (x, y) [m]; 0 where nothing was seen."""
-        return self._at(xy, 0)
+        values: Floats32 = self._at(xy, "confidence")
+        return float(values[0]) if np.ndim(xy) == 1 else values
 
     def count_at(self, xy: npt.ArrayLike) -> int | Counts:
         """Return the update count at map positions (x, y) [m]; 0 is unknown."""
-        return self._at(xy, 1)
+        values: Counts = self._at(xy, "count")
+        return int(values[0]) if np.ndim(xy) == 1 else values
 
-    def _at(self, xy: npt.ArrayLike, layer: int) -> npt.NDArray[np.generic]:
+    def _at(self, xy: npt.ArrayLike, layer: str) -> npt.NDArray[Any]:
         cells = cells_of(xy, self.origin, self.resolution)
-        shape = np.array(self.tile_shape)
-        values = np.zeros(len(cells), dtype=(np.float32, np.uint32)[layer])
-        for position, (index, inner) in enumerate(zip(cells // shape, cells % shape, strict=True)):
-            tile = self._tiles.get(tuple(index.tolist()))
+        values = np.zeros(len(cells), dtype=LAYERS[layer])
+        indices, inner = np.divmod(cells, self.tile_shape)
+        for position, index in enumerate(indices.tolist()):
+            tile = self._tiles.get(tuple(index))
             if tile is not None:
-                values[position] = tile[layer][tuple(inner)]
-        return values[0].item() if np.ndim(xy) == 1 else values
+                values[position] = getattr(tile, layer)[tuple(inner[position])]
+        return values
 
     def cell_bounds(self) -> tuple[Ints, Ints]:
         """Return the first cell of the touched tiles and the cell past the last."""
-        if not self._tiles:
-            return np.zeros(self.ndim, dtype=np.int64), np.zeros(self.ndim, dtype=np.int64)
-        indices = np.array(list(self._tiles), dtype=np.int64)
-        shape = np.array(self.tile_shape)
-        return indices.min(axis=0) * shape, (indices.max(axis=0) + 1) * shape
+        return self._tiles.cell_bounds()
 
     def bounds(self) -> Floats:
         """Return the box around the touched tiles: lower then upper corner [m, map]."""
@@ -150,18 +137,14 @@ class ConfidenceGrid:
             lower, upper = self.cell_bounds()
         else:
             lower, upper = self._cells_of_box(bounds)
-        window = self._empty_window(lower, upper)
-        for index, tile in self._tiles.items():
-            first = np.array(index) * self.tile_shape
-            start = np.maximum(first, lower)
-            stop = np.minimum(first + self.tile_shape, upper)
-            if (start < stop).all():
-                there = tuple(map(slice, start - lower, stop - lower))
-                here = tuple(map(slice, start - first, stop - first))
-                window.confidence[there] = tile.confidence[here]
-                window.count[there] = tile.count[here]
-                window.drop_offs[there] = tile.drop_offs[here]
-        return window
+        dense = self._tiles.read(lower, upper)
+        return GridWindow(
+            dense.confidence,
+            dense.count,
+            dense.drop_offs,
+            origin=self.origin + lower[::-1] * self.resolution,
+            resolution=self.resolution,
+        )
 
     def _cells_of_box(self, bounds: npt.ArrayLike) -> tuple[Ints, Ints]:
         box = as_floats("bounds", bounds, (2 * self.ndim,))
@@ -172,22 +155,15 @@ class ConfidenceGrid:
         lower, upper = np.floor(scaled[0]), np.ceil(scaled[1])
         return lower[::-1].astype(np.int64), upper[::-1].astype(np.int64)
 
-    def _empty_window(self, lower: Ints, upper: Ints) -> GridWindow:
-        shape = tuple((upper - lower).tolist())
-        return GridWindow(
-            confidence=np.zeros(shape, dtype=np.float32),
-            count=np.zeros(shape, dtype=np.uint32),
-            drop_offs=np.zeros(shape, dtype=np.uint32),
-            origin=self.origin + lower[::-1] * self.resolution,
-            resolution=self.resolution,
-        )
-
     def area(self, state: CellState) -> float:
         """Return the area in that state [m²] (volume [m³] in 3-D)."""
-        cells = sum(
-            int((GridWindow(*tile, self.origin, self.resolution).states() == state).sum())
-            for tile in self._tiles.values()
-        )
+        # Tile by tile: a dense window would take the memory of the bounding box.
+        cells = 0
+        for _, tile in self.tiles():
+            window = GridWindow(
+                tile.confidence, tile.count, tile.drop_offs, self.origin, self.resolution
+            )
+            cells += int((window.states() == state).sum())
         return cells * self.resolution**self.ndim
 
     def fuse(self, lower: Ints, z: Floats32) -> None:
@@ -200,7 +176,7 @@ class ConfidenceGrid:
         z : ndarray of float32
             Evidence per cell in [-1, 1]; 0 says nothing and changes nothing.
         """
-        for tile, block in self._blocks(lower, z):
+        for tile, block in self._tiles.cut(lower, z):
             self.rule.update(tile.confidence, tile.count, block)
 
     def add_drop_offs(self, cells: Ints) -> None:
@@ -208,20 +184,6 @@ class ConfidenceGrid:
         for cell in np.unique(cells, axis=0):
             index, inner = divmod(cell, self.tile_shape)
             self.tile(tuple(index.tolist())).drop_offs[tuple(inner)] += 1
-
-    def _blocks(self, lower: Ints, z: Floats32) -> Iterator[tuple[Tile, Floats32]]:
-        """Cut a block along the tiles; pieces that say nothing touch no tile."""
-        shape = np.array(self.tile_shape)
-        upper = lower + z.shape
-        first, last = lower // shape, (upper - 1) // shape
-        for offset in np.ndindex(*(last - first + 1).tolist()):
-            corner = (first + offset) * shape
-            start, stop = np.maximum(corner, lower), np.minimum(corner + shape, upper)
-            piece = z[tuple(map(slice, start - lower, stop - lower))]
-            if piece.any():
-                block = np.zeros(self.tile_shape, dtype=np.float32)
-                block[tuple(map(slice, start - corner, stop - corner))] = piece
-                yield self.tile(tuple((first + offset).tolist())), block
 
     def merge(self, other: ConfidenceGrid) -> ConfidenceGrid:
         """Return a new grid that holds what both saw, as if one mapper had seen all views.
@@ -267,7 +229,10 @@ class ConfidenceGrid:
     def copy(self) -> ConfidenceGrid:
         """Return a grid of its own with the same content."""
         twin = self.like()
-        twin._tiles = {i: Tile(*(a.copy() for a in tile)) for i, tile in self._tiles.items()}
+        for index, tile in self.tiles():
+            mine = twin.tile(index)
+            for layer in LAYERS:
+                getattr(mine, layer)[...] = getattr(tile, layer)
         twin.trajectory = self.trajectory.copy()
         return twin
 
@@ -288,13 +253,11 @@ class ConfidenceGrid:
         OSError
             The folder does not exist or can't be written to.
         """
-        indices = np.array(sorted(self._tiles), dtype=np.int64).reshape(-1, self.ndim)
-        tiles = [self._tiles[tuple(index)] for index in indices.tolist()]
-        layers = {
-            name: np.array([getattr(tile, name) for tile in tiles], dtype=kind).reshape(
-                -1, *self.tile_shape
-            )
-            for name, kind in _LAYERS.items()
+        indices = np.array([index for index, _ in self.tiles()], dtype=np.int64)
+        shape = (len(indices), *self.tile_shape)
+        arrays: dict[str, npt.NDArray[Any]] = {
+            name: np.array([getattr(tile, name) for _, tile in self.tiles()], dtype=kind)
+            for name, kind in LAYERS.items()
         }
         header = {
             "format": FORMAT,
@@ -304,7 +267,10 @@ class ConfidenceGrid:
             "frame": self.frame,
             "rule": self.rule.to_dict(),
         }
-        write_archive(path, header, {"tiles": indices, **layers, "trajectory": self.trajectory})
+        arrays = {name: array.reshape(shape) for name, array in arrays.items()}
+        arrays["tiles"] = indices.reshape(-1, self.ndim)
+        arrays["trajectory"] = self.trajectory
+        write_archive(path, header, arrays)
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> ConfidenceGrid:
@@ -323,15 +289,11 @@ class ConfidenceGrid:
                 frame=header["frame"],
                 rule=rule_from(header["rule"]),
             )
-            layers = [arrays[name].astype(kind, casting="equiv") for name, kind in _LAYERS.items()]
-            for row, index in enumerate(arrays["tiles"].tolist()):
-                tile = grid.tile(tuple(index))
-                for mine, theirs in zip(tile, layers, strict=True):
-                    mine[...] = theirs[row]
+            for name, kind in LAYERS.items():
+                layer = arrays[name].astype(kind, casting="equiv")
+                for row, index in enumerate(arrays["tiles"].tolist()):
+                    getattr(grid.tile(tuple(index)), name)[...] = layer[row]
             grid.trajectory = as_floats("trajectory", arrays["trajectory"], (None, 3))
         except (KeyError, TypeError, ValueError, IndexError) as error:
             raise FileFormatError(path, "a complete map file", f"{error}") from error
         return grid
-
-
-_LAYERS = {"confidence": np.float32, "count": np.uint32, "drop_offs": np.uint32}

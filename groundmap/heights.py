@@ -87,7 +87,9 @@ def flatten(view: View, settings: MapperSettings) -> FlatView:
     dropped = Counter(view.dropped)
     parts = [
         _point_classes(_measure(view.points, view, plane, forward, settings), settings, dropped),
-        _segment_classes(_measure(view.segments, view, plane, forward, settings), settings, dropped),
+        _segment_classes(
+            _measure(view.segments, view, plane, forward, settings), settings, dropped
+        ),
     ]
     obstacles = [part.obstacles for part in parts]
     n_points = len(obstacles[0].xy)
@@ -128,9 +130,7 @@ def _measure(
     height += float(plane.height(view.rig.T_base_camera[:3, 3]))
     sigma = np.sqrt(np.einsum("i,...ij,j->...", up, features.covariance, up))
     tolerance = np.maximum(settings.step_height, 2.0 * sigma + radius * plane.sigma_tilt)
-    return _Heights(
-        xy, axes @ features.covariance @ axes.T, height, tolerance, radius
-    )
+    return _Heights(xy, axes @ features.covariance @ axes.T, height, tolerance, radius)
 
 
 class _Classes(NamedTuple):
@@ -140,9 +140,7 @@ class _Classes(NamedTuple):
     used: int
 
 
-def _point_classes(
-    points: _Heights, settings: MapperSettings, dropped: Counter[str]
-) -> _Classes:
+def _point_classes(points: _Heights, settings: MapperSettings, dropped: Counter[str]) -> _Classes:
     near = points.radius < settings.min_range
     far = points.radius > settings.max_range
     inside = ~near & ~far

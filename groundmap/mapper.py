@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
-from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from groundmap.arrays import Floats
+from groundmap.camera import StereoRig
 from groundmap.evidence import Evidence, drop_off_cells, evidence_of
 from groundmap.features import View
+from groundmap.frames import map_from_world
 from groundmap.fusion import RULES
 from groundmap.grid import ConfidenceGrid
+from groundmap.ground import GroundPlane
 from groundmap.heights import FlatView, flatten
 from groundmap.settings import MapperSettings
 from groundmap.sight2d import SightFan, seen_through, visible_freespace
+from groundmap.stages import Stages
 from groundmap.surfaces import Surfaces, find_surfaces
 from groundmap.triangulation import Mesh, triangulate
 
@@ -32,16 +33,6 @@ class MapperStats:
     features_dropped: Counter[str] = field(default_factory=Counter)  #: by reason
     seen_through: int = 0  #: features behind a surface whose line of sight passes below its top
     through_viewpoint: int = 0  #: edges nearer than min_range
-    stages_s: dict[str, float] = field(default_factory=dict)  #: seconds by stage
-
-    @contextmanager
-    def timed(self, stage: str) -> Iterator[None]:
-        """Add the time spent inside to a stage."""
-        began = perf_counter()
-        try:
-            yield
-        finally:
-            self.stages_s[stage] = self.stages_s.get(stage, 0.0) + perf_counter() - began
 
 
 @dataclass(frozen=True)
@@ -60,6 +51,8 @@ class GroundMapper:
 
     Parameters
     ----------
+    stages : Stages, optional
+        Stopwatch to count the time of each step with, if it is to be shared.
     **settings
         `groundmap.settings.MapperSettings`: ``resolution`` [m/cell], ``fusion``, ``uncertainty``,
         ``max_range`` [m], ``step_height`` [m], ...
@@ -71,19 +64,19 @@ class GroundMapper:
 
     Examples
     --------
-    >>> import groundmap
-    >>> rig = groundmap.StereoRig(fx=700.0, fy=700.0, cx=320.0, cy=240.0, baseline=0.5)
-    >>> view = groundmap.View.from_pixels(
-    ...     np.eye(4) [[2, 0, 1, 3]] * [[1], [-1], [-1], [1]], rig,
-    ...     points_px=[(320.0, 250.0, 240.0 + 150.0)])
-    >>> mapper = groundmap.GroundMapper(resolution=0.5)
-    >>> for view in groundmap.fit_ground([view], camera_height=1.5):
+    >>> from groundmap import StereoRig, View, fit_ground
+    >>> from groundmap.frames import map_from_world
+    >>> rig = StereoRig(fx=700.0, fy=700.0, cx=320.0, cy=240.0, baseline=0.5)
+    >>> seen = [(320.0, 250.0, 450.0)]  # one ground feature, 5 m ahead and 1.5 m below
+    >>> view = View.from_pixels(map_from_world(np.eye(4), "optical"), rig, points_px=seen)
+    >>> mapper = GroundMapper(resolution=0.2)
+    >>> for view in fit_ground([view], camera_height=1.5):
     ...     mapper.integrate(view)
-    >>> mapper.grid.confidence_at((3.0, 0.0))
-    -1.0
+    >>> mapper.grid.confidence_at([(3.0, 0.05), (6.0, 0.05)])
+    array([-1.,  0.], dtype=float32)
     """
 
-    def __init__(self, **settings: Any) -> None:
+    def __init__(self, *, stages: Stages | None = None, **settings: Any) -> None:
         self.settings = MapperSettings(**settings)
         parameters = {"cap": self.settings.cap} if self.settings.fusion == "capped" else {}
         self.grid = ConfidenceGrid(
@@ -92,6 +85,7 @@ class GroundMapper:
             rule=RULES[self.settings.fusion](**parameters),
         )
         self.stats = MapperStats()
+        self.stages = stages or Stages()
 
     def integrate(self, view: View) -> None:
         """Add one view to the grid; a view that is refused leaves the grid as it was.
@@ -107,27 +101,28 @@ class GroundMapper:
             The view has no plane, or its camera looks at the ground or the sky.
         """
         parts = self.explain(view)
-        with self.stats.timed("fuse"):
+        contradictions = seen_through(parts.flat, parts.fan, parts.surfaces)
+        with self.stages.timed("fuse"):
             self.grid.fuse(parts.evidence.lower, parts.evidence.z)
             self.grid.add_drop_offs(drop_off_cells(parts.flat, self.grid))
             self.grid.trajectory = np.concatenate([self.grid.trajectory, _pose2d(view, parts.flat)])
         self.stats.views += 1
         self.stats.features_used += parts.flat.used
         self.stats.features_dropped.update(parts.flat.dropped)
-        self.stats.seen_through += seen_through(parts.flat, parts.fan, parts.surfaces)
+        self.stats.seen_through += contradictions
         self.stats.through_viewpoint += parts.surfaces.through_viewpoint
 
     def explain(self, view: View) -> ViewParts:
         """Return what `integrate` would fuse, with every step on the way; changes nothing."""
-        with self.stats.timed("heights"):
+        with self.stages.timed("heights"):
             flat = flatten(view, self.settings)
-        with self.stats.timed("triangulate"):
+        with self.stages.timed("triangulate"):
             mesh = triangulate(flat.points, flat.segments)
-        with self.stats.timed("surfaces"):
+        with self.stages.timed("surfaces"):
             surfaces = find_surfaces(flat, mesh, self.settings)
-        with self.stats.timed("sight"):
+        with self.stages.timed("sight"):
             fan = visible_freespace(flat, surfaces, self.settings)
-        with self.stats.timed("evidence"):
+        with self.stages.timed("evidence"):
             evidence = evidence_of(flat, surfaces, fan, self.grid, self.settings)
         return ViewParts(flat, mesh, surfaces, fan, evidence)
 
@@ -135,3 +130,17 @@ class GroundMapper:
 def _pose2d(view: View, flat: FlatView) -> Floats:
     yaw = np.arctan2(flat.forward[1], flat.forward[0])
     return np.array([[*view.T_map_base[:2, 3], yaw]])
+
+
+def warm_up(settings: MapperSettings) -> None:
+    """Compile (or load from the cache) all that `integrate` will need, on a view made up for it."""
+    rig = StereoRig(fx=700.0, fy=700.0, cx=320.0, cy=240.0, baseline=0.5)
+    ground, obstacle = (320.0, 250.0, 450.0), (420.0, 350.0, 240.0)
+    view = View.from_pixels(
+        map_from_world(np.eye(4), "optical"),
+        rig,
+        points_px=[ground, obstacle],
+        segments_px=[[(250.0, 180.0, 240.0), (300.0, 230.0, 260.0)]],
+    )
+    mapper = GroundMapper(**settings.model_dump())
+    mapper.integrate(view.with_plane(GroundPlane.below_camera(rig, 1.5)))

@@ -115,7 +115,9 @@ def _support_chords(supports: Floats, settings: MapperSettings) -> Floats:
     ray = supports / radius[:, None]
     cos, sin = np.cos(half)[:, None], np.sin(half)[:, None]
     side = np.stack([-ray[:, 1], ray[:, 0]], axis=1)
-    return radius[:, None, None] * np.stack([ray * cos - side * sin, ray * cos + side * sin], axis=1)
+    return radius[:, None, None] * np.stack(
+        [ray * cos - side * sin, ray * cos + side * sin], axis=1
+    )
 
 
 def _by_bearing(ends: Floats) -> _Edges:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +28,9 @@ class Mesh(NamedTuple):
     edges: Ints  #: shape (e, 2), each edge once
     constrained: Bools  #: shape (e,), edges that are pieces of segments
     source: Ints  #: shape (n,), vertex of each input point
-    crossings: Ints  #: shape (c, 3), (vertex, a, b): a crossing lies on the segment of vertices a, b
+    crossings: (
+        Ints  #: shape (c, 3), (vertex, a, b): a crossing lies on the segment of vertices a, b
+    )
 
 
 def triangulate(points: npt.ArrayLike, segments: npt.ArrayLike = ()) -> Mesh:
@@ -67,7 +69,10 @@ def triangulate(points: npt.ArrayLike, segments: npt.ArrayLike = ()) -> Mesh:
     if outside.any():
         row = int(np.argwhere(outside)[0, 0])
         raise InputError(
-            "segments", f"rows of the {len(xy)} points", str(pairs[row].tolist()), where=f"row {row}"
+            "segments",
+            f"rows of the {len(xy)} points",
+            str(pairs[row].tolist()),
+            where=f"row {row}",
         )
     if len(xy) == 0:
         return _nothing()
@@ -111,8 +116,10 @@ def _insert(vertices: Floats, constraints: Ints, source: Ints) -> Mesh:
     library = cdt.Triangulation(
         cdt.VertexInsertionOrder.AUTO, cdt.IntersectingConstraintEdges.TRY_RESOLVE, 0.0
     )
-    library.insert_vertices(np.ascontiguousarray(vertices))
-    library.insert_edges(constraints.astype(np.uintc))
+    corners: Any = np.ascontiguousarray(vertices)  # Any: its stubs want a Buffer, arrays are one
+    library.insert_vertices(corners)
+    pairs: Any = np.ascontiguousarray(constraints, dtype=np.uintc)
+    library.insert_edges(pairs)
     library.erase_super_triangle()
     found = library.vertices_array()
     points = np.column_stack([found["x"], found["y"]])

@@ -63,13 +63,16 @@ class GridWindow:
 
     def contains(self, cells: Ints) -> Bools:
         """Return which cells lie inside."""
-        inside: Bools = ((cells >= 0) & (cells < self.count.shape)).all(axis=-1)
+        within = (cells >= 0) & (cells < np.array(self.count.shape))
+        inside: Bools = np.logical_and.reduce(within, axis=-1)
         return inside
 
 
 def cells_of(xy: npt.ArrayLike, origin: Floats, resolution: float) -> Ints:
     """Return the cells of positions: axes reversed, borders belong to the cell they open."""
-    positions = as_floats("xy", np.atleast_2d(np.asarray(xy, dtype=np.float64)), (None, len(origin)))
+    positions = as_floats(
+        "xy", np.atleast_2d(np.asarray(xy, dtype=np.float64)), (None, len(origin))
+    )
     check_finite("xy", positions)
     return np.floor((positions - origin) / resolution).astype(np.int64)[:, ::-1]
 

@@ -1,0 +1,34 @@
+"""From A to B on a confidence grid: routes, or reasons why there is none."""
+
+from planners.astar import AStarSettings
+from planners.errors import (
+    AuditError,
+    EnclosedError,
+    NonFreeError,
+    NoRouteError,
+    OutsideMapError,
+    PlanningError,
+    ProblemError,
+    TimeLimitError,
+    UnknownSpaceError,
+)
+from planners.problem import PlanningProblem
+from planners.registry import PLANNERS, plan
+from planners.route import Route
+
+__all__ = [
+    "AStarSettings",
+    "AuditError",
+    "EnclosedError",
+    "NoRouteError",
+    "NonFreeError",
+    "OutsideMapError",
+    "PLANNERS",
+    "PlanningError",
+    "PlanningProblem",
+    "ProblemError",
+    "Route",
+    "TimeLimitError",
+    "UnknownSpaceError",
+    "plan",
+]

@@ -1,9 +1,9 @@
-"""Put the rows of a table in the order of their views, on disk."""
+"""Rows of a table put in the order of their views, on disk."""
 
 from __future__ import annotations
 
-import shutil
 import tempfile
+import weakref
 from collections.abc import Iterable, Iterator
 from typing import IO, Any
 
@@ -15,13 +15,12 @@ from groundmap.arrays import Ints
 CHUNK_ROWS = 65_536
 
 
-def sort_on_disk(
-    chunks: Iterable[npt.NDArray[Any]], views: int, row: np.dtype[Any]
-) -> tuple[npt.NDArray[Any], Ints]:
-    """Sort rows by their column ``view``, keeping the order of rows with the same view.
+class RowsByView:
+    """Rows sorted by their column ``view``; rows of the same view keep their order.
 
-    A counting sort whose rows live in temporary files (in the folder that TMPDIR names): memory
-    holds one chunk, and one number per view.
+    A counting sort between two temporary files (in the folder that TMPDIR names): memory holds
+    one chunk, and two numbers per view. The files have no name on most systems, and are gone with
+    this object, however the program ends.
 
     Parameters
     ----------
@@ -30,36 +29,40 @@ def sort_on_disk(
         Number of views; the column ``view`` is below it.
     row : dtype
 
-    Returns
-    -------
-    rows : ndarray, shape (n,), of type `row`
-        Mapped from a file that has no name any more: its space is free again as soon as the
-        array is gone, however the program ends.
-    offsets : ndarray, shape (views + 1,)
-        The rows of view ``i`` are ``rows[offsets[i]:offsets[i + 1]]``.
-
     Examples
     --------
     >>> table = np.array([(1, 7), (0, 8), (1, 9)], dtype=[("view", np.int64), ("id", np.int64)])
-    >>> rows, offsets = sort_on_disk([table], 3, table.dtype)
-    >>> rows["id"].tolist(), offsets.tolist()
-    ([8, 7, 9], [0, 1, 3, 3])
+    >>> rows = RowsByView([table], 3, table.dtype)
+    >>> [rows.of_view(view)["id"].tolist() for view in range(3)]
+    [[8], [7, 9], []]
     """
-    counts = np.zeros(views, dtype=np.int64)
-    with tempfile.TemporaryFile() as spool, tempfile.TemporaryFile() as target:
-        for chunk in chunks:
-            counts += np.bincount(chunk["view"], minlength=views)
-            spool.write(chunk.tobytes())
-        offsets = np.concatenate([[0], np.cumsum(counts)])
-        # A mapped file with holes kills the process when the disk is full; a copy has none, and
-        # fails with an exception.
-        spool.seek(0)
-        shutil.copyfileobj(spool, target)
-        target.flush()
-        ordered = np.memmap(target, dtype=row, mode="r+", shape=(int(offsets[-1]),))
-        spool.seek(0)
-        _place(_chunks_of(spool, row), ordered, offsets[:-1].copy())
-    return ordered.view(np.ndarray), offsets
+
+    def __init__(self, chunks: Iterable[npt.NDArray[Any]], views: int, row: np.dtype[Any]) -> None:
+        self._row = row
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115 (open as long as this object lives)
+        weakref.finalize(self, self._file.close)
+        counts = np.zeros(views, dtype=np.int64)
+        with tempfile.TemporaryFile() as spool:
+            for chunk in chunks:
+                counts += np.bincount(chunk["view"], minlength=views)
+                spool.write(chunk.tobytes())
+            self._offsets = np.concatenate([[0], np.cumsum(counts)])
+            spool.seek(0)
+            _place(_chunks_of(spool, row), self._file, self._offsets[:-1].copy())
+        self._file.flush()
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return int(self._offsets[-1])
+
+    def of_view(self, view: int) -> npt.NDArray[Any]:
+        """Return the rows of one view, read from disk."""
+        start, stop = self._offsets[view : view + 2].tolist()
+        if start == stop:
+            return np.empty(0, dtype=self._row)
+        # Mapping, unlike seeking, leaves other threads and forked processes alone.
+        offset, shape = start * self._row.itemsize, (stop - start,)
+        return np.array(np.memmap(self._file, self._row, mode="r", offset=offset, shape=shape))
 
 
 def _chunks_of(spool: IO[bytes], row: np.dtype[Any]) -> Iterator[npt.NDArray[Any]]:
@@ -67,11 +70,15 @@ def _chunks_of(spool: IO[bytes], row: np.dtype[Any]) -> Iterator[npt.NDArray[Any
         yield np.frombuffer(data, dtype=row)
 
 
-def _place(chunks: Iterable[npt.NDArray[Any]], ordered: npt.NDArray[Any], free: Ints) -> None:
+def _place(chunks: Iterable[npt.NDArray[Any]], file: IO[bytes], free: Ints) -> None:
     """Write every row to the next free place of its view; `free` is moved on."""
+    # Written, not mapped: a full disk is an exception here, but kills a process that maps.
     for chunk in chunks:
         grouped = chunk[np.argsort(chunk["view"], kind="stable")]
         views, first, counts = np.unique(grouped["view"], return_index=True, return_counts=True)
-        within = np.arange(len(grouped)) - np.repeat(first, counts)
-        ordered[np.repeat(free[views], counts) + within] = grouped
+        for start, place, count in zip(
+            first.tolist(), free[views].tolist(), counts.tolist(), strict=True
+        ):
+            file.seek(place * chunk.itemsize)
+            file.write(grouped[start : start + count].tobytes())
         free[views] += counts

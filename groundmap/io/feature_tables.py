@@ -108,7 +108,8 @@ def read_npz(path: Path) -> dict[Kind, FeatureTable]:
 
 def _load(path: Path) -> dict[str, npt.NDArray[Any]]:
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        # NumPy leaves a file it opened itself open when it is no archive.
+        with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}
     except (zipfile.BadZipFile, ValueError, TypeError, AttributeError, EOFError, OSError) as error:
         raise FileFormatError(

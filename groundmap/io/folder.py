@@ -15,6 +15,9 @@
 ``features.npz``
     Instead of both, and read into memory: ``points`` and/or ``segments``, the same columns as
     2-D arrays, with ``points_columns`` and ``segments_columns``, their names.
+
+In the text files, blank lines and what follows a ``#`` are passed over; a table's header is its
+first line.
 """
 
 from __future__ import annotations

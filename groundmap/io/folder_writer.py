@@ -58,7 +58,7 @@ def write_views(
     """
     if features not in WRITERS:
         raise InputError("features", f"one of {', '.join(WRITERS)}", repr(features))
-    target = Path(path)
+    target = Path(path).resolve()
     _check_target(target, overwrite)
     with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as scratch:
         folder = Path(scratch) / "views"

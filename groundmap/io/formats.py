@@ -48,8 +48,17 @@ def read_views(
 
     Examples
     --------
-    >>> for view in read_views("views/"):  # doctest: +SKIP
-    ...     print(len(view.points), "points seen from", view.T_map_camera[:3, 3])
+    >>> from tempfile import TemporaryDirectory
+    >>> import numpy as np
+    >>> from groundmap import StereoRig, View
+    >>> from groundmap.io import write_views
+    >>> rig = StereoRig(fx=700.0, fy=700.0, cx=320.0, cy=240.0, baseline=0.5)
+    >>> seen = View.from_pixels(np.eye(4), rig, points_px=[(355.0, 320.0, 275.0)])
+    >>> with TemporaryDirectory() as folder:
+    ...     write_views([seen, seen], folder)
+    ...     views = read_views(folder)
+    ...     print(len(views), *(view.points.xyz for view in views))
+    2 [[ 0.5  0.5 10. ]] [[ 0.5  0.5 10. ]]
     """
     folder = Path(path)
     if format is not None and format not in FORMATS:

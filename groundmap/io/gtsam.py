@@ -23,7 +23,7 @@ from groundmap.camera import StereoRig
 from groundmap.errors import FileFormatError, InputError
 from groundmap.features import View
 from groundmap.frames import map_from_world
-from groundmap.io.disk_sort import sort_on_disk
+from groundmap.io.disk_sort import RowsByView
 from groundmap.io.log import ViewLog
 from groundmap.io.poses import check_unique, poses_by_id, read_gtsam
 from groundmap.io.rows import Rows, read_rows, record
@@ -34,8 +34,8 @@ CALIBRATION, POSES, FACTORS = (
     "VO_stereo_factors.txt",
 )
 CALIBRATION_ROW = record([], 6)
-# X Y Z are read to check the row, and not used: they are the pixels triangulated with the same
-# rig, rounded to six digits and without covariance.
+# X Y Z are read to check the row, and not used: they are the same pixels triangulated with the
+# same rig, but without the covariance that the pixels give.
 FACTOR_ROW = record(["pose", "landmark"], 6)
 STORED_ROW = np.dtype([("view", np.int64), ("id", np.int64), ("pixels", np.float64, (3,))])
 
@@ -64,7 +64,7 @@ class GtsamLog(ViewLog):
             T_world_camera = poses_by_id(poses, self.ids)
         self._T_map_camera = map_from_world(T_world_camera, "optical")
         factors = _read_factors(path / FACTORS, self.ids)
-        self._factors, self._offsets = sort_on_disk(factors, len(self.ids), STORED_ROW)
+        self._factors = RowsByView(factors, len(self.ids), STORED_ROW)
         if not len(self._factors):
             raise FileFormatError(path / FACTORS, "at least one factor", "an empty file")
 
@@ -80,7 +80,7 @@ class GtsamLog(ViewLog):
     def __iter__(self) -> Iterator[View]:
         """Iterate over the views in the order of the pose ids."""
         for index, T_map_camera in enumerate(self._T_map_camera):
-            rows = self._factors[self._offsets[index] : self._offsets[index + 1]]
+            rows = self._factors.of_view(index)
             yield View.from_pixels(
                 T_map_camera, self.rig, points_px=rows["pixels"], point_ids=rows["id"]
             )

@@ -33,9 +33,7 @@ def upper_envelope(t0: Floats, t1: Floats, a: Floats, b: Floats) -> tuple[Floats
         for pair in range(pairs):
             i0, i1 = first[2 * pair], first[2 * pair + 1]
             j1 = first[min(2 * pair + 2, first.size - 1)]
-            size = _merge(
-                low, high, edge, i0, i1, j1, a, b, new_low, new_high, new_edge, size
-            )
+            size = _merge(low, high, edge, i0, i1, j1, a, b, new_low, new_high, new_edge, size)
             new_first[pair + 1] = size
         low, high, edge = new_low[:size], new_high[:size], new_edge[:size]
         first = new_first

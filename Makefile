@@ -1,0 +1,43 @@
+PYTHON ?= python3
+WORKERS ?= auto
+
+export PIP_DISABLE_PIP_VERSION_CHECK = 1
+
+BIN := .venv/bin
+READY := .venv/.ready
+WHEEL_VENV := .wheel-venv
+
+.PHONY: help setup test check size wheel-test clean
+
+help: ## Show this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "%-12s %s\n", $$1, $$2}' Makefile
+
+setup: $(READY) ## Create .venv with the project (editable) and its tools
+
+$(READY): pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "groundmap needs Python 3.11 or newer; name one: make PYTHON=python3.11")'
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+	@touch $@
+
+test: $(READY) ## Run the tests and the doctests
+	$(BIN)/pytest -n $(WORKERS)
+
+check: $(READY) ## Check format, lint, types and import contracts
+	$(BIN)/ruff format --check
+	$(BIN)/ruff check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+size: $(READY) ## Print lines per module, longest functions, public names, layers
+	@$(BIN)/python tools/size.py
+
+wheel-test: $(READY) ## Build the wheel, install it alone, run the tests against it
+	rm -rf dist
+	$(BIN)/python -m build --wheel --no-isolation --outdir dist
+	$(BIN)/python tools/install_wheel.py dist $(WHEEL_VENV)
+	cd $(WHEEL_VENV) && bin/pytest -n $(WORKERS) -c '$(CURDIR)/pyproject.toml' --installed '$(CURDIR)/tests' --pyargs groundmap planners
+
+clean: ## Remove everything that the other targets made
+	rm -rf .venv $(WHEEL_VENV) dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	find groundmap planners tests tools -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,237 @@
+"""Fitting the ground: a plane per view, over a window of views, as a pass of its own."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from groundmap.arrays import Floats
+from groundmap.camera import StereoRig
+from groundmap.errors import InputError, NoGroundPlaneError
+from groundmap.features import View
+from groundmap.frames import invert
+from groundmap.ground import TILT_FLOOR, GroundPlane, check_camera
+from groundmap.settings import GroundSettings
+
+NOISE_FLOOR = 0.03  # [m], what even near features are off a real road's plane
+TILTS = np.stack(
+    np.meshgrid(
+        np.tan(np.radians(np.arange(-10.0, 11.0, 2.0))), np.tan(np.radians((-6, -3, 0, 3, 6)))
+    ),
+    axis=-1,
+).reshape(-1, 2)
+SIGMA_TILT_OF_BASE = 0.02  # [rad], of base_link against the ground it stands on
+BIN = 0.1  # [m], height bins of the search
+TOLERANCES = (0.4, 0.3, 0.2, 0.15, 0.15, 0.15)  # [m], of the refinement's steps
+WORST_CONDITION = 1e12  # of the information matrix: beyond this, all features are on one line
+
+
+def fit_ground(
+    views: Iterable[View],
+    *,
+    plane: GroundPlane | None = None,
+    camera_height: float | None = None,
+    **settings: Any,
+) -> Iterator[View]:
+    """Yield the views, each with the ground plane under it.
+
+    A plane is fitted to the features of a window of views around each view (behind it, with
+    ``causal=True``), since planes of single views swing by degrees. Views are read as they are
+    needed: no more than a window is held.
+
+    Parameters
+    ----------
+    views : iterable of View
+    plane : GroundPlane, optional
+        Give every view this plane instead of fitting one.
+    camera_height : float, optional [m]
+        The same, as level ground that far below the camera.
+    **settings
+        `groundmap.settings.GroundSettings`: ``window`` [views], ``causal``, ``max_range`` [m], ...
+
+    Yields
+    ------
+    View
+
+    Raises
+    ------
+    NoGroundPlaneError
+        A camera that looks at the ground or the sky; too few features on any plane below the
+        camera. Where the window of a view has too few but an earlier one had enough, the plane
+        is carried along with the base, with ``support=0``; where the rig is mounted
+        (`T_base_camera` is given), ``base_link`` itself tells where the ground is.
+    """
+    options = GroundSettings(**settings)
+    if plane is not None and camera_height is not None:
+        raise InputError("fit_ground", "plane or camera_height", "both")
+    if plane is not None or camera_height is not None:
+        yield from _with_given_plane(views, plane, camera_height)
+        return
+    last: GroundPlane | None = None
+    for view, window in _windows(views, options):
+        last = _fit(view, window, options) or last
+        if last is None:
+            last = _ground_of_base(view, window)
+        yield view.with_plane(last)
+        last = GroundPlane(normal=last.normal, offset=last.offset, sigma_tilt=last.sigma_tilt)
+
+
+def _with_given_plane(
+    views: Iterable[View], plane: GroundPlane | None, camera_height: float | None
+) -> Iterator[View]:
+    for view in views:
+        check_camera(view)
+        yield view.with_plane(plane or GroundPlane.below_camera(view.rig, camera_height or 0.0))
+
+
+class _Seen(NamedTuple):
+    """A view and its features as the fit reads them."""
+
+    view: View
+    points: Floats  # (n, 3) [m, map]
+    sigmas: Floats  # (n,) [m], standard deviation of the height
+
+
+def _seen(view: View, options: GroundSettings) -> _Seen:
+    check_camera(view)
+    segments = view.segments
+    xyz = np.concatenate([view.points.xyz, segments.xyz.reshape(-1, 3)])
+    covariance = np.concatenate([view.points.covariance, segments.covariance.reshape(-1, 3, 3)])
+    near = np.hypot(xyz[:, 0], xyz[:, 2]) <= options.max_range
+    T_map_camera = view.T_map_camera
+    points = xyz[near] @ T_map_camera[:3, :3].T + T_map_camera[:3, 3]
+    up = T_map_camera[2, :3]
+    return _Seen(view, points, np.sqrt(np.einsum("i,nij,j->n", up, covariance[near], up)))
+
+
+def _windows(views: Iterable[View], options: GroundSettings) -> Iterator[tuple[View, list[_Seen]]]:
+    """Yield each view with the views around it (or before it), holding one window at a time."""
+    ahead = 0 if options.causal else options.window // 2
+    behind = options.window - 1 - ahead
+    held: deque[_Seen] = deque()
+    here = 0  # index in `held` of the next view to hand out
+    for seen in _then_nothing((_seen(view, options) for view in views), times=ahead):
+        if seen is not None:
+            held.append(seen)
+        if here < len(held) and (seen is None or len(held) - here > ahead):
+            yield held[here].view, list(held)
+            here += 1
+            if here > behind:
+                held.popleft()
+                here -= 1
+
+
+def _then_nothing(items: Iterable[_Seen], *, times: int) -> Iterator[_Seen | None]:
+    """Yield the items, then None: the last views have fewer ahead of them."""
+    yield from items
+    for _ in range(times):
+        yield None
+
+
+class _Cloud(NamedTuple):
+    """The features of a window that may be ground, in axes level with the base."""
+
+    points: Floats  # (n, 3) [m], forward, left and up of the camera
+    sigmas: Floats  # (n,) [m]
+    weights: Floats  # (n,) [1/m²]
+
+
+def _fit(view: View, window: list[_Seen], options: GroundSettings) -> GroundPlane | None:
+    """Return the plane under `view`, or None where too few features lie on one."""
+    cloud = _cloud(view, window, options)
+    if len(cloud.points) < options.min_support:
+        return None
+    plane = _search(cloud.points, np.sqrt(cloud.weights))
+    for tolerance in TOLERANCES:
+        refined = _refine(cloud, plane, tolerance, options.min_support)
+        if refined is None:
+            return None
+        plane, information, support = refined
+    a, b, c = plane
+    up = np.array([-a, -b, 1.0]) / np.sqrt(a * a + b * b + 1.0)
+    normal = _level_axes(view.rig).T @ up
+    normal /= np.linalg.norm(normal)
+    tilt = np.sqrt(np.diag(np.linalg.inv(information))[:2].sum())
+    camera_height = -c * up[2]
+    return GroundPlane(
+        normal=normal,
+        offset=float(camera_height - normal @ view.rig.T_base_camera[:3, 3]),
+        sigma_tilt=float(np.hypot(tilt, TILT_FLOOR)),
+        support=support,
+    )
+
+
+def _cloud(view: View, window: list[_Seen], options: GroundSettings) -> _Cloud:
+    T_base_map = invert(view.T_map_base)
+    points = np.concatenate([seen.points for seen in window]) @ T_base_map[:3, :3].T
+    points += T_base_map[:3, 3] - view.rig.T_base_camera[:3, 3]
+    level = points @ _level_axes(view.rig).T
+    low = (-options.highest_camera < level[:, 2]) & (level[:, 2] < -options.lowest_camera)
+    sigmas = np.concatenate([seen.sigmas for seen in window])[low]
+    return _Cloud(level[low], sigmas, 1.0 / (sigmas**2 + NOISE_FLOOR**2))
+
+
+def _refine(
+    cloud: _Cloud, plane: Floats, tolerance: float, min_support: int
+) -> tuple[Floats, Floats, int] | None:
+    """Return a better plane (a, b, c: up = a forward + b left + c), its information and support.
+
+    One step of iteratively reweighted least squares with Tukey's biweight; None where fewer than
+    `min_support` features lie on the plane, or all of them on one line.
+    """
+    x, y, z = cloud.points.T
+    design = np.column_stack([x, y, np.ones(len(x))])
+    residual = z - design @ plane
+    scale = np.sqrt(tolerance**2 + (2 * cloud.sigmas) ** 2)
+    weights = cloud.weights * np.maximum(0.0, 1.0 - (residual / scale) ** 2) ** 2
+    support = int((weights > 0).sum())
+    information = (design * weights[:, None]).T @ design
+    if support < min_support or np.linalg.cond(information) > WORST_CONDITION:
+        return None
+    return np.linalg.solve(information, design.T @ (weights * z)), information, support
+
+
+def _search(points: Floats, weights: Floats) -> Floats:
+    """Find the plane (a, b, c) below the camera that holds most features and has few below it.
+
+    A Hough transform over pitch, roll and height: deterministic, and it takes the whole window
+    at once.
+    """
+    bins = np.floor((points[:, 2] - TILTS @ points[:, :2].T) / BIN).astype(np.int64)
+    lowest = int(bins.min())
+    columns = int(bins.max()) - lowest + 1
+    rows = np.arange(len(TILTS))[:, None] * columns
+    votes = np.bincount(
+        (bins - lowest + rows).ravel(),
+        weights=np.broadcast_to(weights, bins.shape).ravel(),
+        minlength=len(TILTS) * columns,
+    ).reshape(len(TILTS), columns)
+    # A plane holds its bin and both neighbours; what lies lower speaks against it, half as loud.
+    padded = np.pad(votes, ((0, 0), (2, 1)))
+    held = votes + padded[:, 1:-2] + padded[:, 3:]
+    below = np.cumsum(padded, axis=1)[:, :columns]
+    tilt, column = np.unravel_index(int(np.argmax(held - 0.5 * below)), votes.shape)
+    return np.array([*TILTS[tilt], (lowest + column + 0.5) * BIN])
+
+
+def _level_axes(rig: StereoRig) -> Floats:
+    """Rows are forward, left and up of the camera, level in the base."""
+    up = rig.up
+    axis = rig.T_base_camera[:3, 2]
+    forward = axis - (axis @ up) * up
+    forward /= np.linalg.norm(forward)
+    return np.stack([forward, np.cross(up, forward), up])
+
+
+def _ground_of_base(view: View, window: list[_Seen]) -> GroundPlane:
+    if view.rig.is_mounted:
+        return GroundPlane(normal=view.rig.up, offset=0.0, sigma_tilt=SIGMA_TILT_OF_BASE)
+    seen = sum(len(seen.points) for seen in window)
+    raise NoGroundPlaneError(
+        f"no plane below the camera holds enough of the {seen} features of {len(window)} views: "
+        "give the camera's height above the ground (camera_height=..., --camera-height), or "
+        "T_base_camera in the rig, so that base_link tells where the ground is."
+    )

@@ -1,0 +1,119 @@
+"""The last check of every route, by code that no planner uses: shapely on the map itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+from groundmap.arrays import Bools, Floats, Ints
+from groundmap.window import CellState, GridWindow
+from planners.errors import AuditError
+from planners.problem import PlanningProblem
+
+TOLERANCE = 1e-9  # [m]
+PIECE = 16  # [cells] the line is cut into pieces of that length, to look at few cells around it
+
+
+def audit(problem: PlanningProblem, waypoints: Floats) -> None:
+    """Check that a route joins start and goal and keeps its distance everywhere.
+
+    The distance of the line to the square of every cell that the footprint must not touch is at
+    least the footprint's radius, up to a nanometre, and the line enters no such square. These
+    cells are the non-free ones and, unless the problem allows them, the unknown and contested
+    ones, all that lies outside the map included, apart from unknown ones near the start.
+
+    Parameters
+    ----------
+    problem : PlanningProblem
+    waypoints : ndarray, shape (n, 2), n >= 2 [m, map]
+
+    Raises
+    ------
+    AuditError
+    """
+    _check_ends(problem, waypoints)
+    line = _line(waypoints)
+    tolerance = TOLERANCE + 4.0 * float(np.spacing(np.abs(waypoints).max()))
+    reach = problem.footprint + 2.0 * problem.grid.resolution
+    low, high = waypoints.min(axis=0) - reach, waypoints.max(axis=0) + reach
+    window = problem.grid.window(np.concatenate([low, high]))
+    cells = _cells_near(window, line, reach)
+    states = window.states(epsilon=problem.epsilon)[tuple(cells.T)]
+    squares = _squares(window, cells)
+    forbidden = _forbidden(problem, states, squares, tolerance)
+    names = np.array([CellState(state).name.lower() for state in states[forbidden]])
+    _check_distance(problem.footprint, line, squares[forbidden], names, tolerance)
+
+
+def _check_ends(problem: PlanningProblem, waypoints: Floats) -> None:
+    if not np.isfinite(waypoints).all():
+        raise AuditError("is not finite", problem.start_xy, got=np.nan, needed=0.0)
+    for name, asked, got in (
+        ("start", problem.start_xy, waypoints[0]),
+        ("goal", problem.goal_xy, waypoints[-1]),
+    ):
+        off = float(np.hypot(*(got - asked)))
+        if off > TOLERANCE:
+            fault = f"misses the {name}"
+            raise AuditError(fault, (float(got[0]), float(got[1])), got=off, needed=0.0)
+
+
+def _line(waypoints: Floats) -> shapely.Geometry:
+    """Return the route as a line; as a point, if it has no length (a line would be invalid)."""
+    if (waypoints == waypoints[0]).all():
+        return shapely.Point(waypoints[0])
+    return shapely.LineString(waypoints)
+
+
+def _cells_near(window: GridWindow, line: shapely.Geometry, reach: float) -> Ints:
+    """Return the cells [row, col] in boxes around the pieces of the line."""
+    points = shapely.get_coordinates(shapely.segmentize(line, PIECE * window.resolution))
+    near = np.zeros(window.count.shape, dtype=np.bool_)
+    for a, b in zip(points, points[1:] if len(points) > 1 else points, strict=False):
+        first = window.world_to_cell(np.minimum(a, b) - reach)[0]
+        last = window.world_to_cell(np.maximum(a, b) + reach)[0]
+        near[tuple(map(slice, np.maximum(first, 0), last + 1))] = True
+    return np.argwhere(near)
+
+
+def _squares(window: GridWindow, cells: Ints) -> npt.NDArray[np.object_]:
+    lower = window.origin + cells[:, ::-1] * window.resolution
+    upper = window.origin + (cells[:, ::-1] + 1) * window.resolution
+    squares: npt.NDArray[np.object_] = shapely.box(*lower.T, *upper.T)
+    return squares
+
+
+def _forbidden(
+    problem: PlanningProblem,
+    states: npt.NDArray[np.uint8],
+    squares: npt.NDArray[np.object_],
+    tolerance: float,
+) -> Bools:
+    forbidden: Bools = states != CellState.FREE
+    if problem.unknown == "allow":
+        forbidden = states == CellState.NONFREE
+    elif problem.clear_start:
+        away = shapely.distance(shapely.Point(problem.start_xy), squares)
+        near = away <= problem.clear_radius + tolerance
+        forbidden &= ~((states == CellState.UNKNOWN) & near)
+    return forbidden
+
+
+def _check_distance(
+    radius: float,
+    line: shapely.Geometry,
+    squares: npt.NDArray[np.object_],
+    names: npt.NDArray[np.str_],
+    tolerance: float,
+) -> None:
+    tree = shapely.STRtree(squares)
+    for i in tree.query(line, predicate="dwithin", distance=max(radius, tolerance)):
+        distance = float(shapely.distance(line, squares[i]))
+        # With a radius of 0, a line may run along a square's border, but not inside.
+        inside = shapely.buffer(squares[i], -tolerance, join_style="mitre")
+        if distance < radius - tolerance or shapely.relate_pattern(line, inside, "T********"):
+            nearest = shapely.get_coordinates(shapely.shortest_line(line, squares[i]))[0]
+            fault = f"comes too near to a {names[i]} cell"
+            place = (float(nearest[0]), float(nearest[1]))
+            raise AuditError(fault, place, got=distance, needed=radius)

@@ -1,0 +1,58 @@
+"""The command ``groundmap``: exit 0 done, 2 bad input or usage, 3 no route."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+
+import typer
+from typer.exceptions import TyperException
+
+from groundmap.errors import GroundmapError
+from planners.commands.convert import convert_command
+from planners.commands.info import info_command
+from planners.commands.map import map_command
+from planners.commands.plan import plan_command
+from planners.commands.plot import plot_command
+from planners.console import say
+from planners.errors import NoRouteError, PlanningError
+
+DONE, BAD_INPUT, NO_ROUTE, INTERRUPTED = 0, 2, 3, 130
+
+app = typer.Typer(
+    name="groundmap",
+    help="From sparse stereo features to a map one can plan on. Metres, radians, seconds.",
+    no_args_is_help=True,
+    add_completion=False,
+)
+app.command("map")(map_command)
+app.command("plan")(plan_command)
+app.command("plot")(plot_command)
+app.command("info")(info_command)
+app.command("convert")(convert_command)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command and exit: one sentence on stderr where something is wrong."""
+    argv = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        code = app(argv, standalone_mode=False) or DONE
+    except NoRouteError as error:
+        code = _refuse(error, str(error), NO_ROUTE, argv)
+    except (GroundmapError, PlanningError, OSError) as error:
+        code = _refuse(error, str(error), BAD_INPUT, argv)
+    except TyperException as error:
+        code = _refuse(error, error.format_message(), BAD_INPUT, argv)
+    except (KeyboardInterrupt, typer.Abort):
+        say("groundmap: interrupted")
+        code = INTERRUPTED
+    sys.exit(code)
+
+
+def _refuse(error: Exception, reason: str, code: int, argv: Sequence[str]) -> int:
+    """Say why, in a sentence on stderr, and as JSON on stdout where that was asked for."""
+    say(f"groundmap: {reason}")
+    if "--json" in argv:
+        print(json.dumps({"error": type(error).__name__, "reason": reason}))
+    return code

@@ -1,0 +1,1 @@
+"""The commands of ``groundmap``, one per file."""

@@ -1,0 +1,35 @@
+"""``groundmap info``: what a map file holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from groundmap import CellState, ConfidenceGrid
+from planners.console import JsonOption, emit
+
+
+def info_command(
+    map_file: Annotated[Path, typer.Argument(metavar="MAP", help="A map that `map` wrote.")],
+    as_json: JsonOption = False,
+) -> None:
+    """Tell what a map file holds: areas [m²], bounds [m], rule, poses."""
+    grid = ConfidenceGrid.load(map_file)
+    poses = grid.trajectory
+    result = {
+        "resolution": grid.resolution,
+        "frame": grid.frame,
+        "rule": grid.rule.to_dict(),
+        "bounds": grid.bounds().tolist(),
+        "tiles": sum(1 for _ in grid.tiles()),
+        "map_bytes": grid.nbytes,
+        "area_free_m2": grid.area(CellState.FREE),
+        "area_nonfree_m2": grid.area(CellState.NONFREE),
+        "area_contested_m2": grid.area(CellState.CONTESTED),
+        "poses": len(poses),
+        "first_pose": poses[0].tolist() if len(poses) else None,
+        "last_pose": poses[-1].tolist() if len(poses) else None,
+    }
+    emit(result, as_json=as_json, title=f"map {map_file}")

@@ -1,0 +1,122 @@
+"""``groundmap map``: from a log of views to a map."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from groundmap import CellState, GroundMapper, fit_ground, read_views
+from groundmap.archive import check_writable
+from groundmap.errors import FileFormatError, InputError, SettingsError
+from groundmap.mapper import warm_up
+from groundmap.settings import GroundSettings, MapperSettings
+from groundmap.stages import Stages
+from planners.console import JsonOption, emit, seconds_since_start, watched
+
+NOT_MAPPING = {"startup", "read", "compile", "save", "other"}
+
+
+def map_command(
+    source: Annotated[Path, typer.Argument(help="Folder with a log of views.")],
+    out: Annotated[Path, typer.Option(help="File to write the map to.")],
+    poses: Annotated[
+        Path | None, typer.Option(help="File with other poses: TUM rows, or id + 16 numbers.")
+    ] = None,
+    format: Annotated[
+        str | None, typer.Option(help="Format of the log; recognised unless told.")
+    ] = None,
+    resolution: Annotated[
+        float | None, typer.Option(help="Size of a cell [m]; 0.1524 unless told.")
+    ] = None,
+    uncertainty: Annotated[
+        str | None, typer.Option(help="Spread of surfaces: ellipsoid (default), radius, none.")
+    ] = None,
+    fusion: Annotated[
+        str | None, typer.Option(help="Update rule: average (default), capped.")
+    ] = None,
+    max_range: Annotated[
+        float | None, typer.Option(help="Drop farther features [m]; 20 unless told.")
+    ] = None,
+    camera_height: Annotated[
+        float | None,
+        typer.Option(help="Height of the camera above level ground [m]; fitted unless told."),
+    ] = None,
+    config: Annotated[
+        Path | None,
+        typer.Option(help="TOML file with tables [mapper] and [ground]: all other settings."),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Map a log of views into a confidence grid."""
+    stages = Stages(outside="other")
+    stages.seconds["startup"] = seconds_since_start()
+    check_writable(out)
+    tables = _read_config(config)
+    given = {
+        "resolution": resolution,
+        "uncertainty": uncertainty,
+        "fusion": fusion,
+        "max_range": max_range,
+    }
+    chosen = tables["mapper"] | {key: value for key, value in given.items() if value is not None}
+    mapper = GroundMapper(stages=stages, **chosen)
+    GroundSettings(**tables["ground"])
+    with stages.timed("compile"):
+        warm_up(mapper.settings)
+    with stages.timed("read"):
+        log = read_views(source, format=format, poses=poses)
+        total = len(log)
+    if total == 0:
+        raise InputError(str(source), "at least one view", "none")
+    views = fit_ground(stages.each("read", log), camera_height=camera_height, **tables["ground"])
+    for view in watched(stages.each("ground", views), total=total, what="mapping views"):
+        mapper.integrate(view)
+    with stages.timed("save"):
+        mapper.grid.save(out)
+    emit(_summary(mapper, stages, out), as_json=as_json, title=f"map of {source}")
+
+
+def _summary(mapper: GroundMapper, stages: Stages, out: Path) -> dict[str, Any]:
+    grid, stats = mapper.grid, mapper.stats
+    area = {state: grid.area(state) for state in (CellState.FREE, CellState.NONFREE)}
+    seconds = stages.stop()
+    mapping = sum(time for stage, time in seconds.items() if stage not in NOT_MAPPING)
+    return {
+        "views": stats.views,
+        "views_per_s": stats.views / mapping,
+        "features_used": stats.features_used,
+        "features_dropped": dict(stats.features_dropped),
+        "seen_through": stats.seen_through,
+        "through_viewpoint": stats.through_viewpoint,
+        "area_free_m2": area[CellState.FREE],
+        "area_nonfree_m2": area[CellState.NONFREE],
+        "resolution": grid.resolution,
+        "first_pose": grid.trajectory[0].tolist(),
+        "last_pose": grid.trajectory[-1].tolist(),
+        "map_bytes": grid.nbytes,
+        "out": str(out),
+        "stages_s": seconds,
+        "wall_s": seconds_since_start(),
+    }
+
+
+def _read_config(path: Path | None) -> dict[str, dict[str, Any]]:
+    """Read the settings file: tables [mapper] and [ground], nothing else."""
+    tables: dict[str, dict[str, Any]] = {"mapper": {}, "ground": {}}
+    if path is None:
+        return tables
+    try:
+        content = tomllib.loads(path.read_text())
+    except FileNotFoundError as error:
+        raise FileFormatError(path, "a settings file", "no file of that name") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, IsADirectoryError) as error:
+        raise FileFormatError(path, "a TOML file", str(error)) from error
+    for name, table in content.items():
+        if name not in tables or not isinstance(table, dict):
+            raise SettingsError(name, "one of the tables [mapper], [ground]", "another key")
+        tables[name] = table
+    MapperSettings(**tables["mapper"])
+    return tables

@@ -1,0 +1,70 @@
+"""``groundmap plot``: a picture of a map, and of a route on it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from groundmap import ConfidenceGrid
+from groundmap.archive import check_writable
+from groundmap.arrays import Floats, as_floats
+from groundmap.errors import FileFormatError
+from planners.console import JsonOption, emit, numbers
+
+
+def plot_command(
+    map_file: Annotated[Path, typer.Argument(metavar="MAP", help="A map that `map` wrote.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Picture: .png, .pdf or .svg; MAP with .png unless told.")
+    ] = None,
+    bounds: Annotated[
+        str | None,
+        typer.Option(metavar="XMIN,YMIN,XMAX,YMAX", help="Part to draw [m]; all unless told."),
+    ] = None,
+    route: Annotated[Path | None, typer.Option(help="GeoJSON that `plan --out` wrote.")] = None,
+    footprint: Annotated[float, typer.Option(help="Radius drawn along the route [m].")] = 0.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Draw a map: free, non-free, contested and unknown space, and where it was seen from."""
+    picture = out or map_file.with_suffix(".png")
+    check_writable(picture)
+    grid = ConfidenceGrid.load(map_file)
+    box = None if bounds is None else np.array(numbers("bounds", bounds, 4))
+    waypoints = None if route is None else _read_route(route)
+    draw_map(grid, picture, bounds=box, waypoints=waypoints, footprint=footprint)
+    emit({"out": str(picture)}, as_json=as_json, title=f"picture of {map_file}")
+
+
+def draw_map(
+    grid: ConfidenceGrid,
+    picture: Path,
+    *,
+    bounds: Floats | None = None,
+    waypoints: Floats | None = None,
+    footprint: float = 0.0,
+) -> None:
+    """Draw a map, its trajectory and a route into a file."""
+    from groundmap import draw  # loads matplotlib: only when there is something to draw
+
+    box = draw.known_bounds(grid) if bounds is None else bounds
+    figure, axes = draw.new_figure(box)
+    draw.draw_grid(grid, bounds=box, ax=axes)
+    draw.draw_trajectory(grid.trajectory, ax=axes)
+    if waypoints is not None:
+        draw.draw_route(waypoints, footprint=footprint, ax=axes)
+    draw.save_figure(figure, picture)
+
+
+def _read_route(path: Path) -> Floats:
+    """Read the line of a GeoJSON Feature."""
+    try:
+        feature = json.loads(path.read_text())
+        return as_floats("coordinates", feature["geometry"]["coordinates"], (None, 2))
+    except FileNotFoundError as error:
+        raise FileFormatError(path, "a GeoJSON file", "no file of that name") from error
+    except (KeyError, TypeError, ValueError) as error:
+        raise FileFormatError(path, "a GeoJSON Feature with a LineString", str(error)) from error

@@ -1,0 +1,95 @@
+"""What every command does with its results, its progress and its time."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+import typer
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+T = TypeVar("T")
+
+SAY_EVERY = 2.0  # [s], between two lines of progress where there is no terminal
+
+JsonOption = Annotated[
+    bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else there.")
+]
+
+
+def emit(result: Mapping[str, Any], *, as_json: bool, title: str) -> None:
+    """Print a result on stdout: one JSON object, or a table for people."""
+    if as_json:
+        print(json.dumps(result))
+        return
+    table = Table(title=title, title_justify="left", show_header=False, box=None)
+    for name, value in result.items():
+        if name != "waypoints":
+            table.add_row(name.replace("_", " "), _shown(value))
+    Console().print(table)
+
+
+def say(message: str) -> None:
+    """Print a message on stderr."""
+    print(message, file=sys.stderr)
+
+
+def watched(items: Iterable[T], *, total: int, what: str) -> Iterator[T]:
+    """Yield `items` with a progress bar on stderr, or a line now and then without a terminal."""
+    console = Console(stderr=True)
+    if console.is_terminal:
+        yield from track(items, total=total, description=what, console=console, transient=True)
+        return
+    spoke = time.monotonic()
+    for number, item in enumerate(items, start=1):
+        yield item
+        if time.monotonic() - spoke > SAY_EVERY:
+            say(f"{what}: {number} of {total}")
+            spoke = time.monotonic()
+
+
+def seconds_since_start() -> float:
+    """Return how long this process has run: starting Python and loading libraries takes time."""
+    try:
+        ticks = int(Path("/proc/self/stat").read_text().rpartition(")")[2].split()[19])
+        started = ticks / os.sysconf("SC_CLK_TCK")
+        return time.clock_gettime(time.CLOCK_BOOTTIME) - started
+    except (OSError, AttributeError, ValueError, IndexError):
+        return time.process_time()  # elsewhere: the time on the processor, which is nearly it
+
+
+def numbers(name: str, text: str, *lengths: int) -> tuple[float, ...]:
+    """Return the numbers of an option such as ``X,Y[,YAW]``.
+
+    Raises
+    ------
+    typer.BadParameter
+        Not numbers, or another count of them than `lengths` allows.
+    """
+    try:
+        values = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        values = ()
+    if len(values) not in lengths:
+        wanted = " or ".join(str(length) for length in lengths)
+        raise typer.BadParameter(
+            f"expected {wanted} numbers with commas between, got {text!r}", param_hint=f"--{name}"
+        )
+    return values
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} {_shown(part)}" for key, part in value.items()) or "none"
+    if isinstance(value, list | tuple):
+        return ", ".join(_shown(part) for part in value)
+    return str(value)

@@ -1,0 +1,215 @@
+"""Everything that planners raises on purpose.
+
+::
+
+    PlanningError
+    ├── ProblemError (ValueError)    a problem that can't be posed: NaN, a negative footprint, ...
+    ├── NoRouteError                 a well-posed problem without a route
+    │   ├── OutsideMapError          start or goal lies beyond the map
+    │   ├── NonFreeError             the footprint overlaps non-free space there
+    │   ├── UnknownSpaceError        the footprint overlaps unknown or contested space there
+    │   ├── EnclosedError            start or goal is fenced in
+    │   └── TimeLimitError           time ran out before the search ended
+    └── AuditError                   a planner's route that keeps not what was asked: a bug
+
+The exceptions take facts, keep them as attributes, and compose one sentence from them. Settings
+that don't exist or are out of range raise `groundmap.errors.SettingsError`, as everywhere.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, TypeAlias
+
+Place: TypeAlias = Literal["start", "goal"]
+Point: TypeAlias = tuple[float, float]  #: x, y [m, map]
+
+
+class PlanningError(Exception):
+    """Base of every exception of this package."""
+
+
+class ProblemError(PlanningError, ValueError):
+    """A problem that can't be posed.
+
+    Parameters
+    ----------
+    name : str
+        What the value is called where the caller wrote it.
+    expected, got : str
+        What it should have been, and what it is.
+    hint : str, optional
+        What to do about it.
+
+    Examples
+    --------
+    >>> print(ProblemError("footprint", "a radius of 0 or more [m]", "-0.5"))
+    footprint: expected a radius of 0 or more [m], got -0.5.
+    """
+
+    def __init__(self, name: str, expected: str, got: str, *, hint: str = "") -> None:
+        self.name, self.expected, self.got, self.hint = name, expected, got, hint
+        advice = f" {hint}" if hint else ""
+        super().__init__(f"{name}: expected {expected}, got {got}.{advice}")
+
+
+class NoRouteError(PlanningError):
+    """A well-posed problem without a route; the subclasses say why."""
+
+
+class OutsideMapError(NoRouteError):
+    """Start or goal lies beyond the map.
+
+    Examples
+    --------
+    >>> print(OutsideMapError("goal", (90.0, 4.0), bounds=(0.0, -9.75, 48.77, 9.75)))
+    goal (90.00, 4.00): expected a place on the map, which spans x 0.00 to 48.77 m and y -9.75 to \
+9.75 m (box around the touched tiles); nothing was ever seen near it.
+    """
+
+    def __init__(self, place: Place, xy: Point, *, bounds: tuple[float, ...]) -> None:
+        self.place, self.xy, self.bounds = place, xy, bounds
+        spans = "x {:.2f} to {:.2f} m and y {:.2f} to {:.2f} m"
+        extent = (
+            f"which spans {spans.format(bounds[0], bounds[2], bounds[1], bounds[3])} "
+            "(box around the touched tiles)"
+            if bounds
+            else "which is empty"
+        )
+        super().__init__(
+            f"{_at(place, xy)}: expected a place on the map, {extent}; "
+            "nothing was ever seen near it."
+        )
+
+
+class NonFreeError(NoRouteError):
+    """The footprint overlaps non-free space at the start or the goal.
+
+    Examples
+    --------
+    >>> print(NonFreeError("goal", (12.3, 4.1), clearance=0.42, needed=0.9))
+    goal (12.30, 4.10): the footprint (radius 0.90 m) overlaps non-free space; clearance there is \
+0.42 m.
+    """
+
+    def __init__(self, place: Place, xy: Point, *, clearance: float, needed: float) -> None:
+        self.place, self.xy, self.clearance, self.needed = place, xy, clearance, needed
+        super().__init__(
+            f"{_at(place, xy)}: the footprint (radius {needed:.2f} m) overlaps non-free space; "
+            f"clearance there is {clearance:.2f} m."
+        )
+
+
+class UnknownSpaceError(NoRouteError):
+    """The footprint overlaps unknown or contested space at the start or the goal.
+
+    Examples
+    --------
+    >>> print(UnknownSpaceError("start", (0.0, 0.0), clearance=0.25, needed=0.9))
+    start (0.00, 0.00): the footprint (radius 0.90 m) overlaps unknown or contested space, which \
+begins 0.25 m away. Map that place, or plan with unknown='allow'.
+    """
+
+    def __init__(self, place: Place, xy: Point, *, clearance: float, needed: float) -> None:
+        self.place, self.xy, self.clearance, self.needed = place, xy, clearance, needed
+        super().__init__(
+            f"{_at(place, xy)}: the footprint (radius {needed:.2f} m) overlaps unknown or "
+            f"contested space, which begins {clearance:.2f} m away. "
+            "Map that place, or plan with unknown='allow'."
+        )
+
+
+class EnclosedError(NoRouteError):
+    """Start or goal is fenced in.
+
+    Parameters
+    ----------
+    place : {"start", "goal"}
+        Which of the two is fenced in: the one whose reachable area is smaller.
+    area : float [m²]
+        Area of the cells whose centres the footprint's centre can reach from there.
+    nearest : tuple of float [m, map]
+        Of the places that can be reached from the start, the one nearest to the goal.
+    distance : float [m]
+        From there to the goal.
+    widest_gap : float [m]
+        Width of the widest way from start to goal, on the half-cell lattice; 0 if there is none.
+        Not smaller than `needed` where the way only misses the cell centres.
+    needed : float [m]
+        Width of the footprint.
+
+    Examples
+    --------
+    >>> print(EnclosedError("goal", area=12.3, nearest=(7.5, 2.0), distance=3.25,
+    ...                     widest_gap=1.04, needed=1.8))
+    no route: the goal is fenced in: an enclosed area of 12.3 m² around it; the reachable cell \
+nearest to the goal is (7.50, 2.00), 3.25 m away; the widest way from start to goal is 1.04 m \
+wide, the footprint needs 1.80 m.
+    """
+
+    def __init__(
+        self,
+        place: Place,
+        *,
+        area: float,
+        nearest: Point,
+        distance: float,
+        widest_gap: float,
+        needed: float,
+    ) -> None:
+        self.place, self.area, self.nearest, self.distance = place, area, nearest, distance
+        self.widest_gap, self.needed = widest_gap, needed
+        super().__init__(
+            f"no route: the {place} is fenced in: an enclosed area of {area:.1f} m² around it; "
+            f"the reachable cell nearest to the goal is ({nearest[0]:.2f}, {nearest[1]:.2f}), "
+            f"{distance:.2f} m away; {_gap(widest_gap, needed)}."
+        )
+
+
+class TimeLimitError(NoRouteError):
+    """Time ran out before the search ended: a route may or may not exist.
+
+    Examples
+    --------
+    >>> print(TimeLimitError("astar", time_limit=0.5, expanded=180000))
+    astar: no route within time_limit = 0.5 s (180000 nodes expanded). Allow more time.
+    """
+
+    def __init__(self, planner: str, *, time_limit: float, expanded: int) -> None:
+        self.planner, self.time_limit, self.expanded = planner, time_limit, expanded
+        super().__init__(
+            f"{planner}: no route within time_limit = {time_limit:g} s "
+            f"({expanded} nodes expanded). Allow more time."
+        )
+
+
+class AuditError(PlanningError):
+    """A planner returned a route that keeps not what was asked; please report it.
+
+    Examples
+    --------
+    >>> print(AuditError("comes too near to non-free space", (3.0, 1.5), got=0.31, needed=0.9))
+    audit: the route comes too near to non-free space at (3.00, 1.50): expected 0.9 m, got 0.31 m.
+    """
+
+    def __init__(self, fault: str, xy: Point, *, got: float, needed: float) -> None:
+        self.fault, self.xy, self.got, self.needed = fault, xy, got, needed
+        super().__init__(
+            f"audit: the route {fault} at ({xy[0]:.2f}, {xy[1]:.2f}): "
+            f"expected {needed:.9g} m, got {got:.9g} m."
+        )
+
+
+def _gap(widest: float, needed: float) -> str:
+    if widest == 0:
+        return "no way from start to goal exists, however narrow the footprint"
+    way = f"the widest way from start to goal is {widest:.2f} m wide"
+    if widest < needed:
+        return f"{way}, the footprint needs {needed:.2f} m"
+    return (
+        f"{way}, enough for what the footprint needs, {needed:.2f} m, "
+        "but not along cell centres: map with smaller cells"
+    )
+
+
+def _at(place: Place, xy: Point) -> str:
+    return f"{place} ({xy[0]:.2f}, {xy[1]:.2f})"

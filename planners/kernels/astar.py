@@ -1,0 +1,135 @@
+"""A* on an 8-connected grid, in slices, so that Python can watch the clock in between.
+
+Costs are integers: a cell's side is `ONE`, its diagonal `DIAGONAL`. Sums are then exact, a query
+and its reverse cost the same, and equal keys really tie (with floats, f = g + h of equally good
+nodes differs in the last bit, and tie-breaking is lost). 2^-32 of a cell is the rounding per move;
+int64 holds paths of 2^31 cells.
+
+Moves are bits: bit k of ``moves[node]`` says whether the step (ROWS[k], COLS[k]) is allowed,
+counter-clockwise from east (+x): E, NE, N, NW, W, SW, S, SE.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from groundmap.arrays import Bytes, Ints
+from planners.kernels.heap import drop_top, push, replace_top, top_node
+
+ONE = 2**32
+DIAGONAL = 6074001000  # round(sqrt(2) * ONE)
+ROWS = np.array([0, 1, 1, 1, 0, -1, -1, -1], dtype=np.int64)
+COLS = np.array([1, 1, 0, -1, -1, -1, 0, 1], dtype=np.int64)
+MARK, CLOSED, CAME, ROOT = 32, 16, 15, 8  # parts of a mark; ROOT: no move led here, a source did
+
+SLICE_DONE, FOUND, EXHAUSTED, HEAP_FULL = range(4)  # what `advance` returns
+SIZE, BEST, TARGET, EXPANDED = range(4)  # entries of `state`
+FAR = np.iinfo(np.int64).max
+
+
+@njit(cache=True, nogil=True)
+def estimate(row: int, col: int, targets: Ints) -> int:
+    """Return the smallest (octile distance to a target + its final cost).
+
+    Consistent: an octile distance changes by no more than a move's cost along that move; adding
+    a constant doesn't alter that, and neither does the minimum of several such functions.
+    """
+    least = FAR
+    for k in range(len(targets)):
+        rows, cols = abs(row - targets[k, 0]), abs(col - targets[k, 1])
+        low, high = min(rows, cols), max(rows, cols)
+        least = min(least, (high - low) * ONE + low * DIAGONAL + targets[k, 2])
+    return least
+
+
+@njit(cache=True, nogil=True)
+def advance(
+    moves: Bytes,
+    width: int,
+    targets: Ints,
+    labels: Ints,
+    query: int,
+    heap: Ints,
+    state: Ints,
+    budget: int,
+) -> int:
+    """Expand up to `budget` nodes.
+
+    Parameters
+    ----------
+    moves : ndarray of uint8, shape (cells,)
+        Allowed moves of every cell, row by row; none may leave the grid.
+    width : int
+        Cells in a row.
+    targets : ndarray of int64, shape (n, 3)
+        Row, column and final cost of the cells that are joined to the goal.
+    labels : ndarray of int64, shape (cells, 2)
+        Per cell the cost so far and a mark: 32 * query + 16 if closed + the bit of the move that
+        led here (or `ROOT`). Marks below 32 * query are of earlier queries, so nothing needs
+        clearing between queries.
+    query : int
+        Number of this query, from 1.
+    heap : ndarray of int64, shape (room, 2)
+        Keyed by f = g + h; ties go to the smaller h, that is, to the larger g.
+    state : ndarray of int64, shape (4,)
+        Heap size, best total cost, its target, number of expanded nodes.
+
+    Returns
+    -------
+    int
+        `FOUND`, `EXHAUSTED`, `SLICE_DONE`, or `HEAP_FULL` (call again with more room).
+    """
+    fresh, end = MARK * query, state[EXPANDED] + budget
+    size, expanded, best = state[SIZE], state[EXPANDED], state[BEST]
+    status = EXHAUSTED
+    while size > 0 and heap[0, 0] < best:  # nothing else that waits can better `best`
+        if expanded >= end or size + 8 > len(heap):
+            status = SLICE_DONE if expanded >= end else HEAP_FULL
+            break
+        node = top_node(heap)
+        if labels[node, 1] & CLOSED:  # it came out before, at a lower cost
+            size = drop_top(heap, size)
+            continue
+        labels[node, 1] |= CLOSED
+        expanded += 1
+        cost = labels[node, 0]
+        row = node // width
+        col = node - row * width
+        for k in range(len(targets)):
+            if row == targets[k, 0] and col == targets[k, 1] and cost + targets[k, 2] < best:
+                best = cost + targets[k, 2]
+                state[TARGET] = node
+        allowed, on_top = moves[node], True
+        for k in range(8):
+            if (allowed >> k) & 1:
+                to = node + ROWS[k] * width + COLS[k]
+                reached = cost + (DIAGONAL if k & 1 else ONE)
+                if labels[to, 1] < fresh or reached < labels[to, 0]:
+                    labels[to, 0], labels[to, 1] = reached, fresh + k
+                    h = estimate(row + ROWS[k], col + COLS[k], targets)
+                    if on_top:
+                        replace_top(heap, size, reached + h, h, to)
+                        on_top = False
+                    else:
+                        size = push(heap, size, reached + h, h, to)
+        if on_top:
+            size = drop_top(heap, size)
+    if status == EXHAUSTED and best < FAR:
+        status = FOUND
+    state[SIZE], state[EXPANDED], state[BEST] = size, expanded, best
+    return status
+
+
+@njit(cache=True, nogil=True)
+def trace(labels: Ints, width: int, node: int) -> Ints:
+    """Return the cells where the path to `node` begins, turns and ends, last first."""
+    turns = [node]
+    heading = labels[node, 1] & CAME
+    while heading != ROOT:
+        node -= ROWS[heading] * width + COLS[heading]
+        before = labels[node, 1] & CAME
+        if before != heading:
+            turns.append(node)
+        heading = before
+    return np.array(turns, dtype=np.int64)

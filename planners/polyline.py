@@ -1,0 +1,99 @@
+"""Polylines: needless points, and the cells that a line crosses."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from groundmap.arrays import Floats, Ints
+
+SAME = 1e-10  # [m] inner points that near their predecessor are the same point, up to rounding
+
+
+class Crossed(NamedTuple):
+    """The cells a line crosses, in order; a cell may come more than once."""
+
+    cells: Ints  #: shape (n, 2): row, column
+    lengths: Floats  #: shape (n,): length of the line inside [cells]
+
+
+def merged(points: Floats) -> Floats:
+    """Return the polyline without inner points that repeat or lie exactly on a straight line.
+
+    First and last point stay as they are, even if they coincide: a line has two ends.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2), n >= 2 [m]
+
+    Returns
+    -------
+    ndarray, shape (m, 2), m >= 2 [m]
+
+    Examples
+    --------
+    >>> merged(np.array([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0], [3.0, 0.0], [4.0, 1.0]])).tolist()
+    [[0.0, 0.0], [3.0, 0.0], [4.0, 1.0]]
+    """
+    kept = [points[0]]
+    for point in points[1:-1]:
+        _append(kept, point)
+    if len(kept) > 1 and _same(kept[-1], points[-1]):
+        kept.pop()
+    _append(kept, points[-1], even_if_same=True)
+    return np.array(kept)
+
+
+def _append(kept: list[Floats], point: Floats, *, even_if_same: bool = False) -> None:
+    if _same(kept[-1], point) and not even_if_same:
+        return
+    if len(kept) > 1:
+        (ax, ay), (bx, by) = kept[-1] - kept[-2], point - kept[-1]
+        if ax * by == ay * bx and ax * bx + ay * by > 0:
+            kept.pop()
+    kept.append(point)
+
+
+def _same(a: Floats, b: Floats) -> bool:
+    return bool(np.abs(a - b).max() < SAME)
+
+
+def crossed(points: Floats) -> Crossed:
+    """Return the cells that a polyline crosses, and the length inside each.
+
+    Cells that are touched in a point only are left out; a line along a border crosses the cells
+    that the border opens (those above it or right of it). A line of length 0 crosses one cell.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2) [cells]
+
+    Examples
+    --------
+    >>> crossed(np.array([[0.5, 0.5], [2.5, 0.5]]))
+    Crossed(cells=array([[0, 0],
+           [0, 1],
+           [0, 2]]), lengths=array([0.5, 1. , 0.5]))
+    """
+    pieces = [_crossed_piece(a, b) for a, b in pairwise(points)]
+    cells = np.concatenate([piece.cells for piece in pieces])
+    lengths = np.concatenate([piece.lengths for piece in pieces])
+    inside = lengths > 0
+    if not inside.any():
+        return Crossed(cells[:1], lengths[:1])
+    return Crossed(cells[inside], lengths[inside])
+
+
+def _crossed_piece(a: Floats, b: Floats) -> Crossed:
+    cuts = [np.array([0.0, 1.0])]
+    for start, end in zip(a.tolist(), b.tolist(), strict=True):
+        low, high = sorted((start, end))
+        borders = np.arange(np.ceil(low), np.floor(high) + 1.0)
+        if start != end:
+            cuts.append(np.clip((borders - start) / (end - start), 0.0, 1.0))
+    t = np.unique(np.concatenate(cuts))
+    middles = a + ((t[:-1] + t[1:]) / 2.0)[:, None] * (b - a)
+    cells = np.floor(middles).astype(np.int64)[:, ::-1]
+    return Crossed(cells, np.diff(t) * np.hypot(*(b - a)))

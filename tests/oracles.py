@@ -1,0 +1,230 @@
+"""Slow and obvious twins of the geometric core, in NumPy, scipy and shapely."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+import shapely
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from groundmap.arrays import Bools, Floats, Ints
+from groundmap.evidence import Evidence
+from groundmap.sight2d import SightFan
+from groundmap.triangulation import Mesh
+
+Cell: TypeAlias = tuple[int, int]
+
+FAR = 1e3  # shadows end this many times farther away than what casts them
+
+
+# Triangulation
+
+
+def signed_areas(mesh: Mesh) -> Floats:
+    """Area of each triangle, positive if counter-clockwise."""
+    a, b, c = np.moveaxis(mesh.points[mesh.simplices], 1, 0)
+    areas: Floats = 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+    return areas
+
+
+def sides(mesh: Mesh) -> set[Cell]:
+    """Sides of the triangles, as sorted pairs."""
+    corners = mesh.simplices[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    return set(map(tuple, np.sort(corners, axis=1).tolist()))
+
+
+def edge_set(mesh: Mesh) -> set[Cell]:
+    return set(map(tuple, mesh.edges.tolist()))
+
+
+def without_chain(mesh: Mesh, points: Floats, segments: Ints, tolerance: float) -> list[int]:
+    """Rows of the segments that no chain of constrained edges follows from end to end.
+
+    A chain is a path through constrained edges that stay within `tolerance` of the segment between
+    the vertices its ends became.
+    """
+    edges = mesh.edges[mesh.constrained]
+    missing = []
+    for row, (first, last) in enumerate(mesh.source[segments].reshape(-1, 2).tolist()):
+        if first == last:
+            continue
+        line = shapely.LineString(mesh.points[[first, last]])
+        near = shapely.dwithin(shapely.points(mesh.points), line, tolerance)
+        if not _connected(edges[near[edges].all(axis=1)], len(mesh.points), first, last):
+            missing.append(row)
+    assert len(points) == len(mesh.source)
+    return missing
+
+
+def _connected(edges: Ints, count: int, first: int, last: int) -> bool:
+    graph = coo_array((np.ones(len(edges)), tuple(edges.T)), shape=(count, count))
+    _, group = connected_components(graph, directed=False)
+    return bool(group[first] == group[last])
+
+
+def without_segment(mesh: Mesh, segments: Ints, tolerance: float) -> list[int]:
+    """Rows of the constrained edges that lie on no segment."""
+    pieces = shapely.linestrings(mesh.points[mesh.edges[mesh.constrained]])
+    ends = mesh.source[segments].reshape(-1, 2)
+    if len(ends) == 0:
+        return list(range(len(pieces)))
+    around = shapely.buffer(shapely.linestrings(mesh.points[ends]), 1.01 * tolerance)
+    return [
+        row for row, piece in enumerate(pieces) if not shapely.covers(around, piece).any()
+    ]
+
+
+def components(mesh: Mesh) -> int:
+    """How many pieces the vertices and all edges form."""
+    count = len(mesh.points)
+    graph = coo_array((np.ones(len(mesh.edges)), tuple(mesh.edges.T)), shape=(count, count))
+    return int(connected_components(graph, directed=False)[0])
+
+
+def deepest_intrusion(mesh: Mesh) -> float:
+    """How far any vertex lies inside any circumcircle, relative to its radius; Delaunay: none."""
+    deepest = 0.0
+    for corners in mesh.points[mesh.simplices]:
+        a, b = corners[1:] - corners[0]
+        centre = corners[0] + np.linalg.solve(2.0 * np.array([a, b]), [a @ a, b @ b])
+        radius = np.hypot(*(corners[0] - centre))
+        nearest = np.hypot(*(mesh.points - centre).T).min()
+        deepest = max(deepest, float(1.0 - nearest / radius))
+    return deepest
+
+
+# Sight
+
+
+def inverse_ranges(ends: Floats, bearings: Floats) -> Floats:
+    """1 / range of each edge at each bearing, shape (edges, bearings); -inf where it has none.
+
+    Each ray is intersected with each edge by Cramer's rule.
+    """
+    ray = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)[None]
+    start, edge = ends[:, None, 0], (ends[:, 1] - ends[:, 0])[:, None]
+    turn = _cross(ray, edge)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance, share = _cross(start, edge) / turn, _cross(start, ray) / turn
+    hit = (distance > 0) & (share >= 0) & (share <= 1)
+    inverse: Floats = np.where(hit, 1.0 / np.where(hit, distance, 1.0), -np.inf)
+    return inverse
+
+
+def visible_region(surfaces: Floats, chords: Floats) -> shapely.Geometry:
+    """Return what a viewpoint at the origin sees: surfaces hide what is behind them.
+
+    Where there is no surface at a bearing, the chords bound the region.
+    """
+    seen = shapely.union_all(_wedges(surfaces))
+    shadows = shapely.polygons(
+        np.stack([surfaces[:, 0], FAR * surfaces[:, 0], FAR * surfaces[:, 1], surfaces[:, 1]], 1)
+    )
+    seen = shapely.difference(seen, shapely.union_all(shadows))
+    ground = shapely.difference(
+        shapely.union_all(_wedges(chords)), shapely.union_all(_wedges(FAR * surfaces))
+    )
+    return shapely.union(seen, ground)
+
+
+def support_chords(supports: Floats, width: float, angle: float) -> Floats:
+    """Chord of each ground feature: its range, at bearings within min(width / range, angle)."""
+    radius = np.hypot(supports[:, 0], supports[:, 1])
+    half = np.minimum(width / radius, angle)
+    bearing = np.arctan2(supports[:, 1], supports[:, 0])
+    both = bearing[:, None] + np.stack([-half, half], axis=1)
+    return radius[:, None, None] * np.stack([np.cos(both), np.sin(both)], axis=-1)
+
+
+def triangles_of(fan: SightFan) -> list[shapely.Polygon]:
+    """Triangles (viewpoint, start, end) of a fan."""
+    return list(_wedges(fan.ends))
+
+
+def symmetric_difference(a: shapely.Geometry, b: shapely.Geometry) -> float:
+    return float(shapely.symmetric_difference(a, b).area)
+
+
+def _wedges(ends: Floats) -> list[shapely.Polygon]:
+    corners = np.concatenate([np.zeros((len(ends), 1, 2)), ends], axis=1)
+    return list(shapely.polygons(corners)) if len(ends) else []
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    cross: Floats = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return cross
+
+
+# Raster
+
+
+def centres(shape: tuple[int, int]) -> Floats:
+    """Cell centres (x, y) of a block, shape (rows, cols, 2) [cells]."""
+    rows, cols = np.indices(shape)
+    return np.stack([cols + 0.5, rows + 0.5], axis=-1)
+
+
+def cells_inside(geometry: shapely.Geometry, shape: tuple[int, int]) -> Bools:
+    """Which cells' centres lie inside."""
+    middle = centres(shape)
+    inside: Bools = shapely.contains_xy(geometry, middle[..., 0], middle[..., 1])
+    return inside
+
+
+def parity_inside(corners: Floats, shape: tuple[int, int]) -> Bools:
+    """Which cells' centres a ray to the left, from the centre, crosses the outline oddly often."""
+    x, y = np.moveaxis(centres(shape), -1, 0)
+    inside = np.zeros(shape, dtype=np.bool_)
+    for p, q in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        spans = (p[1] <= y) != (q[1] <= y)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            crossing = p[0] + (y - p[1]) / (q[1] - p[1]) * (q[0] - p[0])
+        inside ^= spans & (crossing <= x)
+    return inside
+
+
+def squares(shape: tuple[int, int]) -> Floats:
+    """Cells as shapely boxes, shape (rows, cols)."""
+    rows, cols = np.indices(shape)
+    boxes: Floats = shapely.box(cols, rows, cols + 1, rows + 1)
+    return boxes
+
+
+def cells_crossed(p: Floats, q: Floats, shape: tuple[int, int]) -> Bools:
+    """Which cells a line passes through for some length."""
+    line = shapely.LineString([p, q])
+    crossed: Bools = shapely.length(shapely.intersection(squares(shape), line)) > 0
+    return crossed
+
+
+def cells_in_disc(centre: Floats, radius: float, shape: tuple[int, int]) -> Bools:
+    inside: Bools = np.hypot(*np.moveaxis(centres(shape) - centre, -1, 0)) <= radius
+    return inside
+
+
+# Evidence
+
+
+def said(evidence: Evidence) -> dict[Cell, float]:
+    """z by cell ``(row, col)`` of the grid."""
+    cells = evidence.cells()
+    values = evidence.z[tuple((cells - evidence.lower).T)]
+    return dict(zip(map(tuple, cells.tolist()), values.tolist(), strict=True))
+
+
+def shifted(cells: dict[Cell, float], rows: int, cols: int) -> dict[Cell, float]:
+    return {(row + rows, col + cols): z for (row, col), z in cells.items()}
+
+
+def turned(cells: dict[Cell, float]) -> dict[Cell, float]:
+    """Evidence after a quarter turn, counter-clockwise, about the map's origin."""
+    return {(col, -row - 1): z for (row, col), z in cells.items()}
+
+
+def cell_boxes(cells: list[Cell], resolution: float) -> Floats:
+    """Cells as shapely boxes in the map, shape (n,) [m]."""
+    rows, cols = np.array(cells, dtype=np.float64).reshape(-1, 2).T * resolution
+    boxes: Floats = shapely.box(cols, rows, cols + resolution, rows + resolution)
+    return boxes

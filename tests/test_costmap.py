@@ -1,0 +1,120 @@
+"""Costmap and half-cell lattice: exact clearance, allowed moves, the cleared start."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from groundmap.arrays import Bools
+from oracles_planning import (
+    BLOCKED,
+    UNSEEN,
+    drawing,
+    free_field,
+    grid_of,
+    masks,
+    move_allowed,
+    union_of_squares,
+)
+from planners import PlanningProblem
+from planners.costmap import Costmap
+from planners.kernels.astar import COLS, ROWS
+from planners.lattice import NOWHERE, allowed_moves, squared_clearance, squared_need
+
+RADII = [0.0, 0.3, 0.5, np.sqrt(0.5), 0.9, 1.0, 1.5, np.sqrt(2.5), 2.2]
+
+
+@given(masks())
+def test_lattice_clearance_is_the_distance_to_the_union_of_blocked_squares(blocked: Bools) -> None:
+    squared = squared_clearance(blocked)
+    i, j = np.indices(squared.shape)
+    expected = shapely.distance(shapely.points(j / 2.0, i / 2.0), union_of_squares(blocked))
+    np.testing.assert_allclose(np.sqrt(squared) / 2.0, expected, rtol=0, atol=1e-12)
+
+
+@given(masks(side=6), st.sampled_from(RADII))
+@settings(max_examples=40, deadline=None)
+def test_a_move_is_allowed_if_the_whole_of_it_keeps_the_distance(
+    blocked: Bools, radius: float
+) -> None:
+    moves = allowed_moves(blocked, squared_clearance(blocked), squared_need(radius, 1.0))
+    for row, col in np.ndindex(blocked.shape):
+        for k in range(8):
+            there = (row + int(ROWS[k]), col + int(COLS[k]))
+            expected = move_allowed(blocked, (row, col), there, radius)
+            assert bool(moves[row, col] >> k & 1) == expected
+
+
+@given(masks())
+def test_moves_are_symmetric(blocked: Bools) -> None:
+    moves = allowed_moves(blocked, squared_clearance(blocked), 3)
+    for k in range(4):
+        forth = np.argwhere(moves >> k & 1)
+        back = forth + np.array([ROWS[k], COLS[k]])
+        assert (moves[tuple(back.T)] >> (k + 4) & 1).all()
+        assert (moves >> k & 1).sum() == (moves >> (k + 4) & 1).sum()
+
+
+def test_a_map_without_blocked_cells_is_infinitely_clear() -> None:
+    assert (squared_clearance(np.zeros((2, 3), dtype=np.bool_)) == NOWHERE).all()
+    problem = PlanningProblem(
+        grid_of(free_field(64, 64)), start=(5, 5), goal=(9, 9), footprint=2, unknown="allow"
+    )
+    assert np.isinf(Costmap.of(problem).clearance).all()
+
+
+@pytest.mark.parametrize(("radius", "need"), [(0.3, 36), (0.9, 324), (0.0, 0), (0.301, 37)])
+def test_the_needed_clearance_is_exact_despite_rounding(radius: float, need: int) -> None:
+    assert squared_need(radius, 0.1) == need
+
+
+def test_everything_beyond_the_touched_tiles_is_blocked() -> None:
+    problem = PlanningProblem(
+        grid_of(free_field(64, 64)), start=(9, 9), goal=(20, 20), footprint=1.0
+    )
+    costmap = Costmap.of(problem)
+    assert costmap.blocked.sum() == costmap.blocked.size - 64 * 64
+    assert costmap.clearance_of((9.0, 3.0)) == pytest.approx(3.0, abs=1e-12)
+
+
+def test_clear_start_clears_unknown_cells_within_reach_only() -> None:
+    z = free_field(32, 32)
+    z[:, :10] = UNSEEN
+    problem = PlanningProblem(grid_of(z), start=(11, 16), goal=(30, 16), footprint=1.0)
+    costmap = Costmap.of(problem)
+    rows, cols = np.nonzero(costmap.cleared)
+    squares = shapely.box(*np.array([cols, rows, cols + 1, rows + 1], dtype=float))
+    near = shapely.distance(squares, shapely.points(costmap.to_cells((11, 16))))
+    assert near.max() <= 2.0
+    # Four squares of column 9, which is 1 m away, and two of column 8, which is 2 m away.
+    assert len(rows) == 6
+
+
+def test_clear_start_never_clears_nonfree_or_contested_cells() -> None:
+    z = np.full((16, 16), UNSEEN, dtype=np.float32)
+    z[8, 9] = BLOCKED
+    grid = grid_of(z)
+    grid.tile((0, 0)).confidence[8, 6] = 0.001
+    grid.tile((0, 0)).count[8, 6] = 2
+    costmap = Costmap.of(PlanningProblem(grid, start=(8, 8.5), goal=(12, 12), footprint=2.0))
+    for xy, cleared in (((9.5, 8.5), False), ((6.5, 8.5), False), ((7.5, 8.5), True)):
+        row, col = costmap.window.world_to_cell(xy)[0]
+        assert costmap.cleared[row, col] == cleared
+        assert costmap.blocked[row, col] != cleared
+
+
+def test_drop_offs_are_nonfree() -> None:
+    grid = grid_of(free_field(8, 8))
+    for _ in range(3):
+        grid.add_drop_offs(np.array([[3, 3]]))
+    costmap = Costmap.of(PlanningProblem(grid, start=(1, 1), goal=(6, 6), footprint=0.2))
+    assert costmap.nonfree.sum() == 1
+
+
+def test_allowing_unknown_space_leaves_nonfree_cells_blocked() -> None:
+    grid = grid_of(drawing("?#. ... ..?"))
+    problem = PlanningProblem(grid, start=(0, 0), goal=(2, 2), footprint=0.0, unknown="allow")
+    assert Costmap.of(problem).blocked.sum() == 1

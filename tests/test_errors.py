@@ -1,0 +1,58 @@
+"""The exceptions: what they are, and how their messages read."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from groundmap import errors
+from groundmap.errors import (
+    CameraError,
+    FileFormatError,
+    GroundmapError,
+    InputError,
+    MergeError,
+    NoGroundPlaneError,
+    SettingsError,
+)
+
+words = st.text(min_size=1, max_size=20)
+
+
+def test_everything_raised_on_purpose_is_a_groundmap_error() -> None:
+    own = [value for name, value in vars(errors).items() if name.endswith("Error")]
+    assert len(own) == 7
+    assert all(issubclass(error, GroundmapError) for error in own)
+
+
+@pytest.mark.parametrize("error", [InputError, SettingsError, CameraError, FileFormatError])
+def test_wrong_values_are_value_errors_too(error: type[Exception]) -> None:
+    assert issubclass(error, InputError)
+    assert issubclass(error, ValueError)
+
+
+@pytest.mark.parametrize("error", [NoGroundPlaneError, MergeError])
+def test_refused_scenes_and_maps_are_no_value_errors(error: type[Exception]) -> None:
+    assert not issubclass(error, ValueError)
+
+
+@given(words, words, words, words, words)
+def test_a_message_holds_every_fact_in_reading_order(
+    name: str, expected: str, got: str, where: str, hint: str
+) -> None:
+    error = InputError(name, expected, got, where=where, hint=hint)
+    assert str(error) == f"{name}: expected {expected}, got {got} at {where}. {hint}"
+    facts = (error.name, error.expected, error.got, error.where, error.hint)
+    assert facts == (name, expected, got, where, hint)
+
+
+def test_a_message_without_place_and_hint_leaves_no_gap() -> None:
+    assert str(InputError("fx", "a number", "a word")) == "fx: expected a number, got a word."
+
+
+def test_a_file_error_names_file_and_line() -> None:
+    error = FileFormatError("a/b.csv", "7 columns", "6", line=3)
+    assert (error.path, error.line) == ("a/b.csv", 3)
+    assert str(error) == "a/b.csv: expected 7 columns, got 6 at line 3."
+    assert str(FileFormatError("b.csv", "a table", "none")) == "b.csv: expected a table, got none."
