@@ -27,7 +27,7 @@ check: $(READY) ## Check format, lint, types and import contracts
 	$(BIN)/ruff format --check
 	$(BIN)/ruff check
 	$(BIN)/mypy
-	$(BIN)/lint-imports
+	$(BIN)/lint-imports --no-cache
 
 size: $(READY) ## Print lines per module, longest functions, public names, layers
 	@$(BIN)/python tools/size.py

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from hypothesis import strategies as st
 
 from groundmap import StereoRig, View
@@ -12,6 +14,7 @@ from groundmap.arrays import Floats, Ints
 from groundmap.features import Features
 from groundmap.frames import T_REP103_OPTICAL
 from groundmap.ground import GroundPlane
+from groundmap.heights import FlatView
 
 
 def rngs() -> st.SearchStrategy[np.random.Generator]:
@@ -133,6 +136,42 @@ def _around(rng: np.random.Generator) -> Floats:
     radius = rng.uniform(4.0, 8.0, size=len(bearings))
     corners = radius[:, None] * np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
     return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+
+
+def flat_view(
+    points: npt.ArrayLike = (),
+    segments: npt.ArrayLike = (),
+    *,
+    heights: npt.ArrayLike = 1.0,
+    covariance: npt.ArrayLike = 0.0,
+    supports: npt.ArrayLike = (),
+    support_heights: npt.ArrayLike = 0.0,
+    camera_height: float = 1.0,
+    viewpoint: tuple[float, float] = (0.0, 0.0),
+    forward: tuple[float, float] = (1.0, 0.0),
+) -> FlatView:
+    """Build a view by hand; a covariance is a variance in all directions, or matrices."""
+    xy = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+    ground = np.asarray(supports, dtype=np.float64).reshape(-1, 2)
+    spread = np.asarray(covariance, dtype=np.float64)
+    if spread.ndim < 2:
+        spread = spread[..., None, None] * np.eye(2)
+    return FlatView(
+        viewpoint=np.array(viewpoint),
+        forward=np.array(forward),
+        camera_height=camera_height,
+        points=xy,
+        covariance=np.broadcast_to(spread, (len(xy), 2, 2)).copy(),
+        heights=np.broadcast_to(np.asarray(heights, dtype=np.float64), len(xy)).copy(),
+        segments=np.asarray(segments, dtype=np.int64).reshape(-1, 2),
+        supports=ground,
+        support_heights=np.broadcast_to(
+            np.asarray(support_heights, dtype=np.float64), len(ground)
+        ).copy(),
+        drop_offs=np.empty((0, 2)),
+        used=len(xy) + len(ground),
+        dropped=Counter(),
+    )
 
 
 # Views

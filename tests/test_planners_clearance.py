@@ -14,9 +14,9 @@ from oracles_planning import masks, union_of_squares
 from planners.kernels.clearance import line_clearance, segment_clearance, square_distance
 
 # Quarters hit corners, edges and centres; other numbers hit the rest.
-coordinates = st.integers(-4, 40).map(lambda n: n / 4) | st.integers(-999, 9999).map(lambda n: n / 999)
-    lambda v: round(v, 6)
-)
+quarters = st.integers(-4, 40).map(lambda i: i / 4)
+others = st.integers(-997, 9970).map(lambda i: i / 997)
+coordinates = quarters | others
 lines = arrays(np.float64, st.tuples(st.integers(2, 5), st.just(2)), elements=coordinates)
 
 

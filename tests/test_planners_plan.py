@@ -159,7 +159,7 @@ def test_an_enclosed_pocket_reports_its_area() -> None:
         plan(problem(pocket(), start=(2.25, 2.25), goal=(18.25, 17.25), footprint=0.0))
     error = caught.value
     assert (error.place, error.area, error.widest_gap) == ("goal", 30.0, 0.0)
-    # The nearest free cell outside: left of the 2-cell wall, below it, ... which is nearest.
+    # The nearest cell outside is below the lower wall, at y = 13.75.
     assert error.distance == pytest.approx(math.dist(error.nearest, (18.25, 17.25)))
     assert error.distance == pytest.approx(3.5)
 

@@ -77,10 +77,18 @@ def test_overlapping_segments_share_edges() -> None:
     assert fixed == {(0, 2), (1, 2), (1, 3)}
 
 
+SHORT_BESIDE_A_CROSSING = Cloud(
+    np.array([(0, 4), (4, 1), (4, 3), (2, 2), (0, 1), (2.4006, 2.1996), (2.4014, 2.2004)]),
+    np.array([(0, 1), (2, 3), (2, 4), (5, 6)]),
+)
+
+
 @settings(max_examples=100)
 @given(clouds())
+@example(SHORT_BESIDE_A_CROSSING)
 def test_each_crossing_lies_on_the_segments_it_names(cloud: Cloud) -> None:
     mesh = triangulate(cloud.points, cloud.segments)
+    assert (mesh.crossings[:, 1] != mesh.crossings[:, 2]).all()
     a, b = mesh.points[mesh.crossings[:, 1]], mesh.points[mesh.crossings[:, 2]]
     along, offset = b - a, mesh.points[mesh.crossings[:, 0]] - a
     across = along[:, 0] * offset[:, 1] - along[:, 1] * offset[:, 0]
