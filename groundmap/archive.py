@@ -10,6 +10,7 @@ import json
 import os
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
@@ -19,6 +20,20 @@ import numpy as np
 import numpy.typing as npt
 
 from groundmap.errors import FileFormatError
+
+# What NumPy, zipfile and zlib raise on bytes that are not an archive, or not all of one.
+UNREADABLE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    KeyError,
+    ValueError,
+    TypeError,
+    EOFError,
+    OSError,
+    RuntimeError,
+    SyntaxError,
+    MemoryError,
+)
 
 
 def write_atomically(path: str | PathLike[str], write: Callable[[IO[bytes]], object]) -> None:
@@ -73,17 +88,20 @@ def read_archive(
         raise FileFormatError(path, f"a {expected_format} file", "no file of that name") from error
     except IsADirectoryError as error:
         raise FileFormatError(path, f"a {expected_format} file", "a folder") from error
-    except (zipfile.BadZipFile, KeyError, ValueError, TypeError, EOFError, OSError) as error:
+    except UNREADABLE as error:
         raise FileFormatError(
             path, f"a {expected_format} file", f"something else ({type(error).__name__})"
         ) from error
     if not isinstance(header, dict) or header.get("format") != expected_format:
         raise FileFormatError(path, f"a {expected_format} file", "another kind of archive")
-    if header.get("version", 0) > newest_version:
+    version = header.get("version")
+    if not isinstance(version, int) or isinstance(version, bool):
+        raise FileFormatError(path, "a version number", repr(version))
+    if version > newest_version:
         raise FileFormatError(
             path,
             f"version {newest_version} or older",
-            f"version {header['version']}",
+            f"version {version}",
             hint="Upgrade groundmap.",
         )
     return header, arrays

@@ -184,6 +184,43 @@ def draw_route(waypoints: npt.ArrayLike, *, footprint: float, ax: Axes) -> list[
     return [*artists, casing, core, ends]
 
 
+def draw_verdicts(
+    grid: ConfidenceGrid, *, obstacles: npt.ArrayLike, grounds: npt.ArrayLike, ax: Axes
+) -> list[Artist]:
+    """Draw held-out features by what the map says of them: triangles obstacles, dots ground.
+
+    Green where the map agrees, red where it contradicts, yellow where it does not know.
+
+    Parameters
+    ----------
+    grid : ConfidenceGrid
+    obstacles, grounds : array_like, shape (n, 2) [m, map]
+    """
+    window = grid.window()
+    states = window.states()
+    artists: list[Artist] = []
+    for name, points, marker, right in (
+        ("obstacle", obstacles, "^", CellState.NONFREE),
+        ("ground", grounds, "o", CellState.FREE),
+    ):
+        places = as_floats(name, points, (None, 2))
+        cells = window.world_to_cell(places) if len(places) else np.empty((0, 2), dtype=np.int64)
+        inside = window.contains(cells)
+        found = np.full(len(places), CellState.UNKNOWN, dtype=np.uint8)
+        found[inside] = states[tuple(cells[inside].T)]
+        known = (found == CellState.FREE) | (found == CellState.NONFREE)
+        for label, color, mask in (
+            (f"{name}: agrees", "#2e9e5b", known & (found == right)),
+            (f"{name}: contradicts", "#d62728", known & (found != right)),
+            (f"{name}: unknown", "#e6b800", ~known),
+        ):
+            artist = ax.plot(*places[mask].T, marker, color=color, markersize=3.2, zorder=5)[0]
+            artist.set(label=label, markeredgecolor="white", markeredgewidth=0.3)
+            artists.append(artist)
+    _legend(ax, artists)
+    return artists
+
+
 def save_figure(figure: Figure, path: str | PathLike[str], *, dpi: int = 130) -> None:
     """Write a figure to a .png, .pdf or .svg file, atomically.
 
@@ -235,7 +272,7 @@ def _legend(ax: Axes, handles: list[Any]) -> Artist:
         handles=[*(handle for handle in held if handle is not None), *handles],
         loc="lower left",
         bbox_to_anchor=(0.0, 1.01),
-        ncols=8,
+        ncols=6,
         frameon=False,
         borderaxespad=0.0,
         fontsize=9,

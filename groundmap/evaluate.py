@@ -1,4 +1,4 @@
-"""Held-out evaluation: what do features that the map never saw say about it?
+"""Held-out evaluation: what features that the map never saw say about it.
 
 The judge has its own ground planes (fitted to all views, held-out ones included) and its own fixed
 tolerances; it reads nothing of the mapper's settings, so that no setting can flatter itself.
@@ -7,7 +7,8 @@ tolerances; it reads nothing of the mapper's settings, so that no setting can fl
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +23,7 @@ from groundmap.window import CellState, GridWindow
 
 FOLDS = 5  # one in five is held out
 JUDGED_RANGE = 15.0  # [m]
-GROUND_HEIGHT = 0.12  # [m], features within this of the plane are ground
+GROUND_HEIGHT = 0.10  # [m], features within this of the plane are ground: less than a kerb
 OBSTACLE_HEIGHTS = (0.30, 1.80)  # [m], features between these are obstacles
 NEAR = 0.3  # [m], an obstacle this near to a non-free cell is on the map
 END_OF_SIGHT = 0.3  # [m], the last piece of a sight line is not judged
@@ -31,7 +32,7 @@ STAMP_RADIUS = 0.3  # [m], of the baseline's discs
 
 @dataclass(frozen=True)
 class Figures:
-    """What the held-out features say; every figure is a share, 0 to 1."""
+    """What the held-out features say; shares are 0 to 1, pooled over the five folds."""
 
     obstacle_near_nonfree: float  #: obstacles within 0.3 m of a non-free cell
     obstacle_in_free: float
@@ -43,13 +44,56 @@ class Figures:
     sightline_crosses_nonfree: float  #: of the number of those lines
     trajectory_free: float  #: of the cells driven over since the first known one
     trajectory_nonfree: float
-    trajectory_unseen_start_m: float  #: [m] driven before the first known cell
+    trajectory_unseen_start_m: float  #: [m] driven before the first known cell, mean of the folds
     obstacles: int  #: features judged
     grounds: int
 
-    def to_dict(self) -> dict[str, float | int]:
-        """Return the figures by name."""
-        return asdict(self)
+
+class Tally(NamedTuple):
+    """Sums that figures are made of; tallies of several folds add up field by field."""
+
+    obstacles: float = 0
+    near_nonfree: float = 0
+    in_free: float = 0
+    obstacles_unknown: float = 0
+    grounds: float = 0
+    grounds_free: float = 0
+    grounds_nonfree: float = 0
+    grounds_unknown: float = 0
+    sight_m: float = 0
+    sight_free_m: float = 0
+    crossings: float = 0
+    driven: float = 0
+    driven_free: float = 0
+    driven_nonfree: float = 0
+    unseen_start_m: float = 0
+    maps: float = 0
+
+    def plus(self, other: Tally) -> Tally:
+        """Return the sums of both."""
+        return Tally(*(a + b for a, b in zip(self, other, strict=True)))
+
+    def figures(self) -> Figures:
+        """Return the shares; of nothing, 0."""
+
+        def share(part: float, whole: float) -> float:
+            return part / whole if whole else 0.0
+
+        return Figures(
+            obstacle_near_nonfree=share(self.near_nonfree, self.obstacles),
+            obstacle_in_free=share(self.in_free, self.obstacles),
+            obstacle_unknown=share(self.obstacles_unknown, self.obstacles),
+            ground_free=share(self.grounds_free, self.grounds),
+            ground_nonfree=share(self.grounds_nonfree, self.grounds),
+            ground_unknown=share(self.grounds_unknown, self.grounds),
+            sightline_free=share(self.sight_free_m, self.sight_m),
+            sightline_crosses_nonfree=share(self.crossings, self.grounds),
+            trajectory_free=share(self.driven_free, self.driven),
+            trajectory_nonfree=share(self.driven_nonfree, self.driven),
+            trajectory_unseen_start_m=share(self.unseen_start_m, self.maps),
+            obstacles=int(self.obstacles),
+            grounds=int(self.grounds),
+        )
 
 
 class HeldOut(NamedTuple):
@@ -64,24 +108,29 @@ class Verdict(NamedTuple):
     """One protocol's outcome."""
 
     figures: Figures
-    grid: ConfidenceGrid
-    held_out: HeldOut
+    grid: ConfidenceGrid  #: the map of the last fold
+    held_out: HeldOut  #: what that map was judged by
 
 
-Split = Callable[[int, View], tuple[View | None, View | None]]
+# Fold, number of the view, view: what of it is mapped, what is held out.
+Split = Callable[[int, int, View], tuple[View | None, View | None]]
 
 
-def evaluate(views: Iterable[View], **settings: Any) -> dict[str, Verdict]:
+def evaluate(
+    views: Iterable[View], *, watch: Callable[[list[Any]], Iterable[Any]] = iter, **settings: Any
+) -> dict[str, Verdict]:
     """Map a part of a log and judge the map by the rest, in three ways and with a baseline.
 
     ``views`` holds out every fifth view; ``ids`` holds out a fifth of the landmarks, in all views;
     ``thin`` maps a fifth of the landmarks and judges by another fifth; ``stamping`` is ``views``
-    with a map that only stamps a disc at each feature.
+    with a map that only stamps a disc at each feature. Each is done five times, with another
+    fifth held out, and the five are pooled: no choice of the fifth can flatter.
 
     Parameters
     ----------
     views : iterable of View
-        A log that can be read more than once.
+    watch : callable
+        Wraps the list of steps, to show progress.
     **settings
         `groundmap.settings.MapperSettings`.
 
@@ -92,14 +141,16 @@ def evaluate(views: Iterable[View], **settings: Any) -> dict[str, Verdict]:
     """
     judged = list(fit_ground(views))
     _check_log(judged)
+    trajectory = np.array([view.T_map_base[:2, 3] for view in judged])
+    tallies = dict.fromkeys(PROTOCOLS, Tally())
     verdicts = {}
-    for name, (split, mapped_by) in PROTOCOLS.items():
-        parts = [split(number, view) for number, view in enumerate(judged)]
-        to_map = (view for view, _ in parts if view is not None)
-        grid = mapped_by(to_map, settings)
+    for name, fold in watch([(name, fold) for name in PROTOCOLS for fold in range(FOLDS)]):
+        split, mapped_by = PROTOCOLS[name]
+        parts = [split(fold, number, view) for number, view in enumerate(judged)]
+        grid = mapped_by((view for view, _ in parts if view is not None), settings)
         held_out = sort_by_height(view for _, view in parts if view is not None)
-        trajectory = np.array([view.T_map_base[:2, 3] for view in judged])
-        verdicts[name] = Verdict(judge(grid, held_out, trajectory), grid, held_out)
+        tallies[name] = tallies[name].plus(judge(grid, held_out, trajectory))
+        verdicts[name] = Verdict(tallies[name].figures(), grid, held_out)
     return verdicts
 
 
@@ -117,24 +168,24 @@ def _check_log(views: list[View]) -> None:
         )
 
 
-def _fold(view: View) -> Ints:
+def _folds(view: View) -> Ints:
     """Return the fold of each landmark, the same in every view and in no order of the ids."""
     scrambled = view.points.ids.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
     return ((scrambled >> np.uint64(32)) % np.uint64(FOLDS)).astype(np.int64)
 
 
-def _by_view(number: int, view: View) -> tuple[View | None, View | None]:
-    return (None, view) if number % FOLDS == FOLDS - 1 else (view, None)
+def _by_view(fold: int, number: int, view: View) -> tuple[View | None, View | None]:
+    return (None, view) if number % FOLDS == fold else (view, None)
 
 
-def _by_id(number: int, view: View) -> tuple[View | None, View | None]:
-    fold = _fold(view)
-    return _only(view, fold != 0), _only(view, fold == 0)
+def _by_id(fold: int, number: int, view: View) -> tuple[View | None, View | None]:
+    folds = _folds(view)
+    return _only(view, folds != fold), _only(view, folds == fold)
 
 
-def _thinned(number: int, view: View) -> tuple[View | None, View | None]:
-    fold = _fold(view)
-    return _only(view, fold == 1), _only(view, fold == 0)
+def _thinned(fold: int, number: int, view: View) -> tuple[View | None, View | None]:
+    folds = _folds(view)
+    return _only(view, folds == (fold + 1) % FOLDS), _only(view, folds == fold)
 
 
 def _only(view: View, keep: Bools) -> View:
@@ -158,7 +209,9 @@ def _stamped(views: Iterable[View], settings: dict[str, Any]) -> ConfidenceGrid:
         if len(places) == 0:
             continue
         reach = STAMP_RADIUS + grid.resolution
-        window = grid.window(np.concatenate([places.min(axis=0) - reach, places.max(axis=0) + reach]))
+        window = grid.window(
+            np.concatenate([places.min(axis=0) - reach, places.max(axis=0) + reach])
+        )
         z = np.zeros(window.count.shape, dtype=np.float32)
         for points, value in ((seen.grounds, -1.0), (seen.obstacles, 1.0)):
             cells, distance = _cells_around(window, points, STAMP_RADIUS, to_centre=True)
@@ -177,7 +230,7 @@ PROTOCOLS: dict[str, tuple[Split, Callable[[Iterable[View], dict[str, Any]], Con
 
 
 def sort_by_height(views: Iterable[View]) -> HeldOut:
-    """Sort the point features of views by the judge's heights; others, and far ones, are left out."""
+    """Sort the point features of views by the judge's heights; far ones are left out."""
     rows = list(_sorted(views))
     obstacles, grounds, viewpoints = zip(*rows, strict=True) if rows else ((), (), ())
     none = np.empty((0, 2))
@@ -203,8 +256,8 @@ def _sorted(views: Iterable[View]) -> Iterator[tuple[Floats, Floats, Floats]]:
         yield obstacles, grounds, np.tile(T_map_camera[:2, 3], (len(grounds), 1))
 
 
-def judge(grid: ConfidenceGrid, held_out: HeldOut, trajectory: Floats) -> Figures:
-    """Return the figures of a map.
+def judge(grid: ConfidenceGrid, held_out: HeldOut, trajectory: Floats) -> Tally:
+    """Return the tally of one map.
 
     Parameters
     ----------
@@ -216,36 +269,30 @@ def judge(grid: ConfidenceGrid, held_out: HeldOut, trajectory: Floats) -> Figure
     states = window.states()
     at_obstacle = _states_at(window, states, held_out.obstacles)
     at_ground = _states_at(window, states, held_out.grounds)
-    free_length, crosses = _sight_lines(window, states, held_out)
+    sight_m, sight_free_m, crossings = _sight_lines(window, states, held_out)
     driven = _along(window, trajectory)
-    at_driven = _states_at(window, states, driven)
-    known = np.flatnonzero(at_driven != CellState.UNKNOWN)
+    known = np.flatnonzero(_states_at(window, states, driven) != CellState.UNKNOWN)
     first = int(known[0]) if len(known) else len(driven)
-    cells = np.unique(window.world_to_cell(driven[first:]), axis=0)
+    cells = np.unique(window.world_to_cell(driven[first:]).reshape(-1, 2), axis=0)
     on_cells = _states_at(window, states, window.cell_to_world(cells))
-    return Figures(
-        obstacle_near_nonfree=_share(_near_nonfree(window, states, held_out.obstacles)),
-        obstacle_in_free=_share(at_obstacle == CellState.FREE),
-        obstacle_unknown=_share(_not_known(at_obstacle)),
-        ground_free=_share(at_ground == CellState.FREE),
-        ground_nonfree=_share(at_ground == CellState.NONFREE),
-        ground_unknown=_share(_not_known(at_ground)),
-        sightline_free=free_length,
-        sightline_crosses_nonfree=_share(crosses),
-        trajectory_free=_share(on_cells == CellState.FREE),
-        trajectory_nonfree=_share(on_cells == CellState.NONFREE),
-        trajectory_unseen_start_m=_length(driven[: first + 1]),
-        obstacles=len(held_out.obstacles),
-        grounds=len(held_out.grounds),
+    return Tally(
+        obstacles=len(at_obstacle),
+        near_nonfree=_near_nonfree(window, states, held_out.obstacles).sum(),
+        in_free=(at_obstacle == CellState.FREE).sum(),
+        obstacles_unknown=_not_known(at_obstacle).sum(),
+        grounds=len(at_ground),
+        grounds_free=(at_ground == CellState.FREE).sum(),
+        grounds_nonfree=(at_ground == CellState.NONFREE).sum(),
+        grounds_unknown=_not_known(at_ground).sum(),
+        sight_m=sight_m,
+        sight_free_m=sight_free_m,
+        crossings=crossings,
+        driven=len(on_cells),
+        driven_free=(on_cells == CellState.FREE).sum(),
+        driven_nonfree=(on_cells == CellState.NONFREE).sum(),
+        unseen_start_m=float(np.hypot(*np.diff(driven[: first + 1], axis=0).T).sum()),
+        maps=1,
     )
-
-
-def _share(flags: Bools) -> float:
-    return float(flags.mean()) if flags.size else 0.0
-
-
-def _length(points: Floats) -> float:
-    return float(np.hypot(*np.diff(points, axis=0).T).sum())
 
 
 def _not_known(states: Bytes) -> Bools:
@@ -295,27 +342,23 @@ def _along(window: GridWindow, points: Floats) -> Floats:
     """Return places along a polyline, a quarter of a cell apart."""
     step = 0.25 * window.resolution
     pieces = [points[:1]]
-    for a, b in zip(points[:-1], points[1:], strict=True):
+    for a, b in pairwise(points):
         count = max(1, int(np.ceil(np.hypot(*(b - a)) / step)))
         pieces.append(a + (b - a) * (np.arange(1, count + 1) / count)[:, None])
     return np.concatenate(pieces)
 
 
-def _sight_lines(
-    window: GridWindow, states: Bytes, held_out: HeldOut
-) -> tuple[float, Bools]:
-    """Return the share of the sight lines' length that is free, and which lines cross non-free."""
-    free, total = 0.0, 0.0
-    crosses = np.zeros(len(held_out.grounds), dtype=np.bool_)
-    for number, (start, end) in enumerate(
-        zip(held_out.viewpoints, held_out.grounds, strict=True)
-    ):
-        length = float(np.hypot(*(end - start))) - END_OF_SIGHT
+def _sight_lines(window: GridWindow, states: Bytes, held_out: HeldOut) -> tuple[float, float, int]:
+    """Return the length of the sight lines, how much of it is free [m], how many cross non-free."""
+    total, free, crossings = 0.0, 0.0, 0
+    for start, end in zip(held_out.viewpoints, held_out.grounds, strict=True):
+        distance = float(np.hypot(*(end - start)))
+        length = distance - END_OF_SIGHT
         if length <= 0:
             continue
-        ray = (end - start) / (length + END_OF_SIGHT)
-        seen = _states_at(window, states, _along(window, np.array([start, start + ray * length])))
-        free += length * _share(seen == CellState.FREE)
+        stop = start + (end - start) * (length / distance)
+        seen = _states_at(window, states, _along(window, np.array([start, stop])))
         total += length
-        crosses[number] = bool((seen == CellState.NONFREE).any())
-    return (free / total if total else 0.0), crosses
+        free += length * float((seen == CellState.FREE).mean())
+        crossings += int((seen == CellState.NONFREE).any())
+    return total, free, crossings

@@ -56,7 +56,7 @@ def evidence_of(
     to_cells = _CellsOf(flat, grid)
     origin = to_cells(np.zeros((1, 2)))[0]
     free, ends = to_cells(fan.free), to_cells(surfaces.ends)
-    outlines = to_cells(model.outline(surfaces.ends, surfaces.reach))
+    outlines = to_cells(model.outline(surfaces.cores, surfaces.reach))
     caps = model.caps(surfaces.reach) / grid.resolution
     discs = surfaces.discs / grid.resolution
     corners = [free, outlines, ends, *_around(ends, caps), *_around(ends, discs[:, None])]

@@ -29,6 +29,7 @@ class Surfaces(NamedTuple):
     """Surfaces of one view, each a straight piece; shape (s, ...)."""
 
     ends: Floats  #: shape (s, 2, 2) [m, view], counter-clockwise around the viewpoint
+    cores: Floats  #: shape (s, 2, 2) [m, view], what spreads: the same, of lone points a cell
     reach: Floats  #: shape (s, 2) [m], how far freespace ends before it
     tops: Floats  #: shape (s, 2) [m] above the ground
     kind: Bytes  #: shape (s,), `SurfaceKind`
@@ -82,6 +83,8 @@ def find_surfaces(flat: FlatView, mesh: Mesh, settings: MapperSettings) -> Surfa
     discs = _discs(vertices, mesh.edges[believed], ends)
     radius = np.maximum(0.5 * settings.resolution, discs.sigma)
     everything = np.concatenate([ends.xy, _silhouettes(discs.xy, radius)])
+    half_cell = np.full(len(radius), 0.5 * settings.resolution)
+    cores = np.concatenate([ends.xy, _silhouettes(discs.xy, half_cell)])
     reach = settings.spread_sigmas * np.concatenate([ends.sigma, _twice(discs.sigma)])
     tops = np.concatenate([ends.high, _twice(discs.high)])
     kind = np.concatenate(
@@ -91,10 +94,11 @@ def find_surfaces(flat: FlatView, mesh: Mesh, settings: MapperSettings) -> Surfa
         ]
     )
     clockwise = _cross(everything[:, 0], everything[:, 1]) < 0
-    for pairs in (everything, reach, tops):
+    for pairs in (everything, cores, reach, tops):
         pairs[clockwise] = pairs[clockwise, ::-1]
     return Surfaces(
         ends=everything,
+        cores=cores,
         reach=reach,
         tops=tops,
         kind=kind.astype(np.uint8),

@@ -11,6 +11,7 @@ from typer.exceptions import TyperException
 
 from groundmap.errors import GroundmapError
 from planners.commands.convert import convert_command
+from planners.commands.evaluate import evaluate_command
 from planners.commands.info import info_command
 from planners.commands.map import map_command
 from planners.commands.plan import plan_command
@@ -31,6 +32,7 @@ app.command("plan")(plan_command)
 app.command("plot")(plot_command)
 app.command("info")(info_command)
 app.command("convert")(convert_command)
+app.command("evaluate")(evaluate_command)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

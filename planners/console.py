@@ -36,6 +36,17 @@ def emit(result: Mapping[str, Any], *, as_json: bool, title: str) -> None:
     Console().print(table)
 
 
+def emit_columns(columns: Mapping[str, Mapping[str, Any]], *, title: str) -> None:
+    """Print results side by side for people: a column for each, a row for each of their keys."""
+    table = Table(title=title, title_justify="left", box=None)
+    table.add_column("")
+    for name in columns:
+        table.add_column(name, justify="right")
+    for key in next(iter(columns.values())):
+        table.add_row(key.replace("_", " "), *(_shown(column[key]) for column in columns.values()))
+    Console().print(table)
+
+
 def say(message: str) -> None:
     """Print a message on stderr."""
     print(message, file=sys.stderr)

@@ -114,11 +114,15 @@ def _touches_tile(problem: PlanningProblem, xy: tuple[float, float], margin: flo
 
 
 def _check_space(costmap: Costmap, place: Place) -> None:
-    """Check that the footprint fits: first against non-free space, then against all blocked."""
+    """Check that the footprint fits: the state of the place itself comes before what is near."""
     problem = costmap.problem
     xy = problem.start_xy if place == "start" else problem.goal_xy
     col, row = np.floor(costmap.to_cells(xy)[0]).astype(np.int64)
-    for blocked, error in ((costmap.nonfree, NonFreeError), (costmap.blocked, UnknownSpaceError)):
+    unknown = costmap.blocked & ~costmap.nonfree
+    checks = [(costmap.nonfree, NonFreeError), (unknown, UnknownSpaceError)]
+    if unknown[row, col]:
+        checks.reverse()
+    for blocked, error in checks:
         distance = line_clearance(blocked, costmap.to_cells(xy)) * costmap.window.resolution
         if distance < problem.footprint - SLACK or blocked[row, col]:
             raise error(place, xy, clearance=distance, needed=problem.footprint)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -204,6 +205,35 @@ def pixels_of(stereo: StereoRig, xyz: Floats) -> Floats:
     left = stereo.fx * x / z + stereo.cx
     right = stereo.fx * (x - stereo.baseline) / z + stereo.cx
     return np.stack([left, right, stereo.fy * y / z + stereo.cy], axis=-1)
+
+
+def level_view(
+    *,
+    points: npt.ArrayLike = (),
+    segments: npt.ArrayLike = (),
+    sigma: float = 0.0,
+    camera_height: float = 1.0,
+    sigma_tilt: float = 0.0,
+) -> View:
+    """View of features given by (forward, left, height above ground) from a level camera."""
+    stereo = rig(mounted=False)
+    level = GroundPlane.below_camera(stereo, camera_height)
+    return View(
+        T_map_base=pose(0.0, 0.0, 0.0, mounted=False),
+        rig=stereo,
+        points=_features(np.asarray(points, dtype=np.float64).reshape(-1, 3), sigma, level.offset),
+        segments=_features(
+            np.asarray(segments, dtype=np.float64).reshape(-1, 2, 3), sigma, level.offset
+        ),
+        plane=replace(level, sigma_tilt=sigma_tilt),
+    )
+
+
+def _features(places: Floats, sigma: float, camera_height: float) -> Features:
+    forward, left, height = np.moveaxis(places, -1, 0)
+    xyz = np.stack([-left, camera_height - height, forward], axis=-1)
+    covariance = np.broadcast_to(sigma**2 * np.eye(3), (*xyz.shape, 3))
+    return Features(xyz, covariance.copy(), np.full(len(xyz), -1, dtype=np.int64))
 
 
 @st.composite

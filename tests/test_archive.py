@@ -40,9 +40,12 @@ arrays = hnp.arrays(
 def archive_bytes() -> bytes:
     """Return an archive with members of several kinds and sizes."""
     rng = np.random.default_rng(3)
+    contents: dict[str, Array] = {
+        "noise": rng.random(40).astype(np.float32),
+        "zeros": np.zeros((8, 8)),
+    }
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "a"
-        contents = {"noise": rng.random(40).astype(np.float32), "zeros": np.zeros((8, 8))}
         write_archive(path, HEADER, contents)
         return path.read_bytes()
 
@@ -194,7 +197,7 @@ def test_an_archive_of_another_format_is_refused(tmp_path: Path, header: object)
 
 def test_a_newer_version_is_refused_with_what_to_do(tmp_path: Path) -> None:
     write_archive(tmp_path / "a", {**HEADER, "version": 3}, {})
-    with pytest.raises(FileFormatError, match="version 2 or older, got version 3. Upgrade"):
+    with pytest.raises(FileFormatError, match=r"version 2 or older, got version 3\. Upgrade"):
         read_archive(tmp_path / "a", FORMAT, 2)
     assert read_archive(tmp_path / "a", FORMAT, 3)[0]["version"] == 3
 

@@ -105,7 +105,7 @@ def test_depth_grows_uncertain_with_its_square() -> None:
     assert np.sqrt(far[2, 2] / near[2, 2]) == pytest.approx(4.0)
 
 
-BAD = {
+BAD: dict[str, list[tuple[float, ...]]] = {
     "not_finite": [(np.nan, 0, 0), (0, np.inf, 0), (9, 1, -np.inf), (np.inf, np.inf, 0)],
     "no_disparity": [(5, 5, 0), (5, 6, 0), (-5, 5, 1)],
 }
@@ -113,13 +113,13 @@ BAD = {
 
 @given(
     st.lists(st.sampled_from(["good", *BAD]), max_size=12),
-    st.randoms(use_true_random=False),
+    st.lists(st.integers(0, 11), min_size=12, max_size=12),
 )
 def test_rows_without_a_point_are_dropped_and_counted_by_reason(
-    kinds: list[str], random: object
+    kinds: list[str], choices: list[int]
 ) -> None:
-    choice = random.choice  # type: ignore[attr-defined]
-    rows = [(40.0, 5.0, 1.0) if kind == "good" else choice(BAD[kind]) for kind in kinds]
+    known = {**BAD, "good": [(40.0, 5.0, 1.0)]}
+    rows = [known[kind][i % len(known[kind])] for kind, i in zip(kinds, choices, strict=False)]
     found = RIG.triangulate(rows)
     assert found.kept.tolist() == [kind == "good" for kind in kinds]
     assert len(found.xyz) == len(found.covariance) == kinds.count("good")
@@ -171,12 +171,12 @@ def test_a_rig_without_length_focus_or_noise_is_refused(name: str, value: float)
 
 @pytest.mark.parametrize("name", ["cx", "cy"])
 def test_a_principal_point_that_is_not_finite_is_refused(name: str) -> None:
-    with pytest.raises(CameraError, match="^cx, cy: expected finite numbers"):
+    with pytest.raises(CameraError, match=r"^cx, cy: expected finite numbers"):
         replace(RIG, **{name: np.nan})  # type: ignore[arg-type]
 
 
 def test_a_mounting_that_is_not_rigid_is_refused() -> None:
-    with pytest.raises(CameraError, match="^T_base_camera: expected a rotation with orthonormal"):
+    with pytest.raises(CameraError, match=r"^T_base_camera: expected a rotation with orthonormal"):
         replace(RIG, T_base_camera=2.0 * np.eye(4))
 
 

@@ -155,7 +155,7 @@ def test_ids_must_be_as_many_as_the_matches_given(name: str) -> None:
 )
 def test_coordinates_of_another_shape_are_refused(kind: str, shape: tuple[int, ...]) -> None:
     make = Features.points if kind == "points" else Features.segments
-    with pytest.raises(InputError, match="^xyz: expected shape"):
+    with pytest.raises(InputError, match=r"^xyz: expected shape"):
         make(np.ones(shape), spread(2))
 
 

@@ -119,7 +119,7 @@ def test_mirrored_transforms_are_refused(transform: Floats, axis: int) -> None:
 @given(transforms(), st.integers(0, 3), st.floats(0.01, 10.0))
 def test_another_last_row_is_refused(transform: Floats, col: int, off: float) -> None:
     transform[3, col] += off
-    with pytest.raises(CameraError, match="^T: expected a last row of 0 0 0 1"):
+    with pytest.raises(CameraError, match=r"^T: expected a last row of 0 0 0 1"):
         check_transform("T", transform)
 
 

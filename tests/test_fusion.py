@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from math import ceil, log
+from random import Random
 
 import numpy as np
 import numpy.testing as npt
 import pytest
-from dense_grid import rounding_of_mean
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from dense_grid import rounding_of_mean
 from groundmap.arrays import Counts, Floats32
 from groundmap.errors import InputError
 from groundmap.fusion import RULES, Average, Capped, UpdateRule, rule_from
@@ -55,9 +56,9 @@ def test_zeros_change_neither_value_nor_count(before: Floats32, after: Floats32)
 
 
 @given(views, st.randoms(use_true_random=False))
-def test_the_order_of_views_does_not_matter_to_the_average(z: Floats32, random: object) -> None:
+def test_the_order_of_views_does_not_matter_to_the_average(z: Floats32, random: Random) -> None:
     order = list(range(len(z)))
-    random.shuffle(order)  # type: ignore[attr-defined]
+    random.shuffle(order)
     confidence, count = fused(Average(), z)
     shuffled, count_shuffled = fused(Average(), z[order])
     npt.assert_array_equal(count, count_shuffled)
@@ -139,11 +140,11 @@ def test_a_rule_comes_back_from_its_description(rule: UpdateRule) -> None:
 
 @pytest.mark.parametrize("described", [{"name": "mean"}, {}, {"cap": 5}])
 def test_an_unknown_rule_is_refused_with_the_known_ones(described: dict[str, object]) -> None:
-    with pytest.raises(InputError, match="^rule: expected one of average, capped, got"):
+    with pytest.raises(InputError, match=r"^rule: expected one of average, capped, got"):
         rule_from(described)
 
 
 @pytest.mark.parametrize("cap", [0, -1])
 def test_a_cap_below_one_is_refused(cap: int) -> None:
-    with pytest.raises(InputError, match="^cap: expected a count of 1 or more"):
+    with pytest.raises(InputError, match=r"^cap: expected a count of 1 or more"):
         Capped(cap)

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 import numpy.testing as npt
 import pytest
-from dense_grid import DenseGrid
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from dense_grid import DenseGrid
 from groundmap import CellState, ConfidenceGrid, GridWindow
 from groundmap.arrays import Floats32, Ints
 from groundmap.errors import FileFormatError, InputError, MergeError
@@ -402,9 +402,7 @@ def test_rows_layers_and_columns_of_a_3d_window() -> None:
 
 @given(blocks(2), st.floats(0.01, 2.0), st.integers(0, 2**32 - 1))
 @settings(max_examples=30)
-def test_positions_look_up_what_the_window_shows(
-    block: Fuse, resolution: float, seed: int
-) -> None:
+def test_positions_look_up_what_the_window_shows(block: Fuse, resolution: float, seed: int) -> None:
     grid = ConfidenceGrid(resolution=resolution, origin=(0.3, -0.7))
     grid.fuse(*block)
     rng = np.random.default_rng(seed)
@@ -497,7 +495,7 @@ def test_an_origin_that_is_no_place_is_refused(origin: tuple[float, ...], messag
 def a_map(ndim: int = 2) -> ConfidenceGrid:
     """Return a small map with all that a file has to hold."""
     grid = ConfidenceGrid(
-        resolution=0.1524, origin=np.arange(ndim) / 3.0, frame="straße 5", rule=Capped(7)
+        resolution=0.1524, origin=[0.0, 1 / 3, 2 / 3][:ndim], frame="straße 5", rule=Capped(7)
     )
     rng = np.random.default_rng(5)
     for _ in range(9):
@@ -613,7 +611,7 @@ def test_a_tampered_file_is_refused(how: str, tmp_path: Path) -> None:
     with np.load(path) as archive:
         arrays = {name: archive[name] for name in archive.files}
     TAMPERED[how](arrays)
-    np.savez(path, **arrays)  # type: ignore[arg-type]
+    np.savez(path, **arrays)
     with pytest.raises(FileFormatError, match=r"map\.npz: expected .*, got "):
         ConfidenceGrid.load(path)
 

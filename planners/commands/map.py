@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,10 +9,10 @@ import typer
 
 from groundmap import CellState, GroundMapper, fit_ground, read_views
 from groundmap.archive import check_writable
-from groundmap.errors import FileFormatError, InputError, SettingsError
+from groundmap.errors import InputError
 from groundmap.mapper import warm_up
-from groundmap.settings import GroundSettings, MapperSettings
 from groundmap.stages import Stages
+from planners.commands.settings_file import ConfigOption, read_settings
 from planners.console import JsonOption, emit, seconds_since_start, watched
 
 NOT_MAPPING = {"startup", "read", "compile", "save", "other"}
@@ -44,17 +43,14 @@ def map_command(
         float | None,
         typer.Option(help="Height of the camera above level ground [m]; fitted unless told."),
     ] = None,
-    config: Annotated[
-        Path | None,
-        typer.Option(help="TOML file with tables [mapper] and [ground]: all other settings."),
-    ] = None,
+    config: ConfigOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Map a log of views into a confidence grid."""
     stages = Stages(outside="other")
     stages.seconds["startup"] = seconds_since_start()
     check_writable(out)
-    tables = _read_config(config)
+    tables = read_settings(config)
     given = {
         "resolution": resolution,
         "uncertainty": uncertainty,
@@ -63,7 +59,6 @@ def map_command(
     }
     chosen = tables["mapper"] | {key: value for key, value in given.items() if value is not None}
     mapper = GroundMapper(stages=stages, **chosen)
-    GroundSettings(**tables["ground"])
     with stages.timed("compile"):
         warm_up(mapper.settings)
     with stages.timed("read"):
@@ -101,22 +96,3 @@ def _summary(mapper: GroundMapper, stages: Stages, out: Path) -> dict[str, Any]:
         "stages_s": seconds,
         "wall_s": seconds_since_start(),
     }
-
-
-def _read_config(path: Path | None) -> dict[str, dict[str, Any]]:
-    """Read the settings file: tables [mapper] and [ground], nothing else."""
-    tables: dict[str, dict[str, Any]] = {"mapper": {}, "ground": {}}
-    if path is None:
-        return tables
-    try:
-        content = tomllib.loads(path.read_text())
-    except FileNotFoundError as error:
-        raise FileFormatError(path, "a settings file", "no file of that name") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, IsADirectoryError) as error:
-        raise FileFormatError(path, "a TOML file", str(error)) from error
-    for name, table in content.items():
-        if name not in tables or not isinstance(table, dict):
-            raise SettingsError(name, "one of the tables [mapper], [ground]", "another key")
-        tables[name] = table
-    MapperSettings(**tables["mapper"])
-    return tables

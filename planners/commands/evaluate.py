@@ -1,0 +1,59 @@
+"""``groundmap evaluate``: how good the map of a log is, by features that it never saw."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from groundmap import read_views
+from groundmap.archive import check_writable
+from groundmap.evaluate import Verdict, evaluate
+from planners.commands.settings_file import ConfigOption, read_settings
+from planners.console import JsonOption, emit, emit_columns, watched
+
+
+def evaluate_command(
+    source: Annotated[Path, typer.Argument(help="Folder with a log of views.")],
+    poses: Annotated[
+        Path | None, typer.Option(help="File with other poses: TUM rows, or id + 16 numbers.")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw the map and the held-out features: .png, .pdf, .svg.")
+    ] = None,
+    config: ConfigOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Judge maps of a log by the features held out of them; shares, 0 to 1."""
+    if plot is not None:
+        check_writable(plot)
+    log = read_views(source, poses=poses)
+
+    def watch(steps: list[Any]) -> Any:
+        return watched(steps, total=len(steps), what="mapping and judging")
+
+    verdicts = evaluate(log, watch=watch, **read_settings(config)["mapper"])
+    if plot is not None:
+        _draw(verdicts["views"], plot)
+    figures = {name: asdict(verdict.figures) for name, verdict in verdicts.items()}
+    if as_json:
+        emit(figures, as_json=True, title="")
+    else:
+        emit_columns(figures, title=f"held-out evaluation of {source}")
+
+
+def _draw(verdict: Verdict, picture: Path) -> None:
+    from groundmap import draw  # loads matplotlib: only when there is something to draw
+
+    figure, axes = draw.new_figure(draw.known_bounds(verdict.grid))
+    draw.draw_grid(verdict.grid, ax=axes)
+    draw.draw_trajectory(verdict.grid.trajectory, ax=axes)
+    draw.draw_verdicts(
+        verdict.grid,
+        obstacles=verdict.held_out.obstacles,
+        grounds=verdict.held_out.grounds,
+        ax=axes,
+    )
+    draw.save_figure(figure, picture)
