@@ -26,6 +26,7 @@ app = typer.Typer(
     help="From sparse stereo features to a map one can plan on. Metres, radians, seconds.",
     no_args_is_help=True,
     add_completion=False,
+    pretty_exceptions_enable=False,
 )
 app.command("map")(map_command)
 app.command("plan")(plan_command)

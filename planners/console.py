@@ -29,7 +29,8 @@ def emit(result: Mapping[str, Any], *, as_json: bool, title: str) -> None:
     if as_json:
         print(json.dumps(result))
         return
-    table = Table(title=title, title_justify="left", show_header=False, box=None)
+    print(title)
+    table = Table(show_header=False, box=None)
     for name, value in result.items():
         if name != "waypoints":
             table.add_row(name.replace("_", " "), _shown(value))
@@ -38,7 +39,8 @@ def emit(result: Mapping[str, Any], *, as_json: bool, title: str) -> None:
 
 def emit_columns(columns: Mapping[str, Mapping[str, Any]], *, title: str) -> None:
     """Print results side by side for people: a column for each, a row for each of their keys."""
-    table = Table(title=title, title_justify="left", box=None)
+    print(title)
+    table = Table(box=None)
     table.add_column("")
     for name in columns:
         table.add_column(name, justify="right")

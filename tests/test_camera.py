@@ -118,7 +118,7 @@ BAD: dict[str, list[tuple[float, ...]]] = {
 def test_rows_without_a_point_are_dropped_and_counted_by_reason(
     kinds: list[str], choices: list[int]
 ) -> None:
-    known = {**BAD, "good": [(40.0, 5.0, 1.0)]}
+    known: dict[str, list[tuple[float, ...]]] = {**BAD, "good": [(40.0, 5.0, 1.0)]}
     rows = [known[kind][i % len(known[kind])] for kind, i in zip(kinds, choices, strict=False)]
     found = RIG.triangulate(rows)
     assert found.kept.tolist() == [kind == "good" for kind in kinds]

@@ -3,24 +3,34 @@
 from __future__ import annotations
 
 import json
+from itertools import islice
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 
-from groundmap import ConfidenceGrid
+from groundmap import ConfidenceGrid, GroundMapper, fit_ground, read_views
 from groundmap.archive import check_writable
 from groundmap.arrays import Floats, as_floats
-from groundmap.errors import FileFormatError
+from groundmap.errors import FileFormatError, InputError
+from planners.commands.settings_file import ConfigOption, read_settings
 from planners.console import JsonOption, emit, numbers
 
 
 def plot_command(
-    map_file: Annotated[Path, typer.Argument(metavar="MAP", help="A map that `map` wrote.")],
+    map_file: Annotated[
+        Path,
+        typer.Argument(metavar="MAP", help="A map that `map` wrote; with --explain, a log."),
+    ],
     out: Annotated[
         Path | None, typer.Option(help="Picture: .png, .pdf or .svg; MAP with .png unless told.")
     ] = None,
+    explain: Annotated[
+        int | None,
+        typer.Option(metavar="VIEW", help="Take view number VIEW of a log apart, from 0."),
+    ] = None,
+    config: ConfigOption = None,
     bounds: Annotated[
         str | None,
         typer.Option(metavar="XMIN,YMIN,XMAX,YMAX", help="Part to draw [m]; all unless told."),
@@ -32,6 +42,10 @@ def plot_command(
     """Draw a map: free, non-free, contested and unknown space, and where it was seen from."""
     picture = out or map_file.with_suffix(".png")
     check_writable(picture)
+    if explain is not None:
+        _draw_view(map_file, explain, read_settings(config), picture)
+        emit({"out": str(picture)}, as_json=as_json, title=f"view {explain} of {map_file}")
+        return
     grid = ConfidenceGrid.load(map_file)
     box = None if bounds is None else np.array(numbers("bounds", bounds, 4))
     waypoints = None if route is None else _read_route(route)
@@ -57,6 +71,20 @@ def draw_map(
     if waypoints is not None:
         draw.draw_route(waypoints, footprint=footprint, ax=axes)
     draw.save_figure(figure, picture)
+
+
+def _draw_view(source: Path, number: int, settings: dict[str, dict[str, Any]], out: Path) -> None:
+    """Draw one view of a log, taken apart, into a file."""
+    from groundmap import draw  # loads matplotlib: only when there is something to draw
+
+    log = read_views(source)
+    if not 0 <= number < len(log):
+        raise InputError("explain", f"a view from 0 to {len(log) - 1}", str(number))
+    mapper = GroundMapper(**settings["mapper"])
+    views = fit_ground(log, **settings["ground"])
+    parts = mapper.explain(next(islice(views, number, None)))
+    figure = draw.draw_view(parts, mapper.grid, title=f"view {number} of {source}")
+    draw.save_figure(figure, out)
 
 
 def _read_route(path: Path) -> Floats:

@@ -1,0 +1,22 @@
+"""Pictures: the only package that imports matplotlib, and only when something is drawn.
+
+Every function draws on `ax`, or on new axes, and returns the artists it made. The four states keep
+apart in greyscale, too: free is the lightest, unknown darker, contested darker still, non-free
+nearly black.
+"""
+
+from groundmap.draw.figure import new_figure, save_figure
+from groundmap.draw.maps import draw_grid, draw_trajectory, draw_verdicts, known_bounds
+from groundmap.draw.routes import draw_route
+from groundmap.draw.views import draw_view
+
+__all__ = [
+    "draw_grid",
+    "draw_route",
+    "draw_trajectory",
+    "draw_verdicts",
+    "draw_view",
+    "known_bounds",
+    "new_figure",
+    "save_figure",
+]

@@ -1,0 +1,150 @@
+"""One view taken apart, by which the method is understood and debugged."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from groundmap.arrays import Floats
+from groundmap.grid import ConfidenceGrid
+from groundmap.mapper import ViewParts
+from groundmap.surfaces import SurfaceKind
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+GROUND, DROP_OFF, SEEN_END = "#6a9a3b", "#d62728", "#1f5f8b"
+SURFACES = {
+    SurfaceKind.SEGMENT: ("#221122", 2.2, "segments"),
+    SurfaceKind.LINK: ("#a04050", 1.6, "links"),
+    SurfaceKind.LONE: ("#d08030", 2.2, "lone points"),
+}
+
+
+def draw_view(parts: ViewParts, grid: ConfidenceGrid, *, title: str = "") -> Figure:
+    """Draw features, triangulation, sight fan and evidence of one view, side by side.
+
+    The first three are in the view's ground frame: the camera at the origin looks along x.
+
+    Parameters
+    ----------
+    parts : ViewParts
+        From `groundmap.GroundMapper.explain`.
+    grid : ConfidenceGrid
+        The mapper's grid, for its cells.
+    title : str
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(13.0, 10.0), layout="constrained")
+    axes = figure.subplots(2, 2)
+    figure.suptitle(title)
+    for ax, draw in zip(
+        axes.ravel()[:3], (_draw_features, _draw_triangulation, _draw_fan), strict=True
+    ):
+        draw(parts, ax)
+        ax.plot(0.0, 0.0, "^", color="0.1", markersize=8)
+        ax.set_xlabel("x [m, view]")
+        ax.set_ylabel("y [m, view]")
+        ax.legend(loc="upper left", fontsize=8, framealpha=0.9)
+    low, high = _reach(parts)
+    for ax in axes.ravel()[:3]:
+        ax.set_xlim(low[0], high[0])
+        ax.set_ylim(low[1], high[1])
+        ax.set_aspect("equal")
+    _draw_evidence(parts, grid, axes[1, 1])
+    return figure
+
+
+def _reach(parts: ViewParts) -> tuple[Floats, Floats]:
+    flat = parts.flat
+    places = np.concatenate([np.zeros((1, 2)), flat.points, flat.supports, flat.drop_offs])
+    return places.min(axis=0) - 1.0, places.max(axis=0) + 1.0
+
+
+def _draw_features(parts: ViewParts, ax: Axes) -> None:
+    flat = parts.flat
+    points = ax.scatter(
+        flat.points[:, 0],
+        flat.points[:, 1],
+        c=flat.heights,
+        s=14,
+        cmap="plasma_r",
+        vmin=0.0,
+        label="obstacles",
+    )
+    ax.figure.colorbar(points, ax=ax, label="height above ground [m]", shrink=0.7)
+    for a, b in flat.segments.tolist():
+        ax.plot(*flat.points[[a, b]].T, color="0.3", linewidth=1.0)
+    ax.plot(*flat.supports.T, ".", color=GROUND, markersize=4, label="ground")
+    ax.plot(*flat.drop_offs.T, "v", color=DROP_OFF, markersize=5, label="below ground")
+    dropped = ", ".join(f"{count} {reason}" for reason, count in sorted(flat.dropped.items()))
+    ax.set_title(
+        f"features by height; left out: {dropped.replace('_', ' ') or 'none'}", fontsize=10
+    )
+
+
+def _draw_triangulation(parts: ViewParts, ax: Axes) -> None:
+    from matplotlib.collections import LineCollection
+
+    frontiers = LineCollection(
+        list(parts.surfaces.frontiers), colors="0.75", linewidths=0.6, linestyles="--"
+    )
+    frontiers.set_label("frontiers: too long to believe")
+    ax.add_collection(frontiers)
+    _draw_surfaces(parts, ax)
+    ax.set_title("constrained Delaunay triangulation", fontsize=10)
+
+
+def _draw_surfaces(parts: ViewParts, ax: Axes) -> None:
+    from matplotlib.collections import LineCollection
+
+    for kind, (color, width, label) in SURFACES.items():
+        ends = parts.surfaces.ends[parts.surfaces.kind == kind]
+        if len(ends):
+            lines = LineCollection(list(ends), colors=color, linewidths=width)
+            lines.set_label(label)
+            ax.add_collection(lines)
+
+
+def _draw_fan(parts: ViewParts, ax: Axes) -> None:
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    fan = parts.fan
+    viewpoint = np.zeros((len(fan.free), 1, 2))
+    triangles = np.concatenate([viewpoint, fan.free], axis=1)
+    on_ground = fan.surface < 0
+    for rows, color, label in (
+        (~on_ground, "#dbe9f4", "free up to a surface"),
+        (on_ground, "#e3efd6", "free as far as ground is seen"),
+    ):
+        pieces = PolyCollection(list(triangles[rows]), facecolors=color, edgecolors="none")
+        pieces.set_label(label)
+        ax.add_collection(pieces)
+    ends = LineCollection(list(fan.ends), colors=SEEN_END, linewidths=0.8)
+    ends.set_label("where sight ends")
+    ax.add_collection(ends)
+    _draw_surfaces(parts, ax)
+    ax.set_title(f"sight fan: {len(fan.free)} triangles, {fan.area:.0f} m²", fontsize=10)
+
+
+def _draw_evidence(parts: ViewParts, grid: ConfidenceGrid, ax: Axes) -> None:
+    lower, z = parts.evidence
+    x, y = grid.origin + lower[::-1] * grid.resolution
+    rows, cols = z.shape
+    picture = ax.imshow(
+        np.where(z == 0, np.nan, z),
+        origin="lower",
+        extent=(x, x + cols * grid.resolution, y, y + rows * grid.resolution),
+        cmap="PuOr_r",
+        vmin=-1.0,
+        vmax=1.0,
+        interpolation="nearest",
+    )
+    ax.figure.colorbar(picture, ax=ax, label="z: free below 0, non-free above", shrink=0.7)
+    ax.set_facecolor("0.8")
+    ax.set_xlabel("x [m, map]")
+    ax.set_ylabel("y [m, map]")
+    ax.set_title(f"evidence: {int((z != 0).sum())} cells", fontsize=10)
