@@ -9,8 +9,6 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-import zipfile
-import zlib
 from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
@@ -20,20 +18,6 @@ import numpy as np
 import numpy.typing as npt
 
 from groundmap.errors import FileFormatError
-
-# What NumPy, zipfile and zlib raise on bytes that are not an archive, or not all of one.
-UNREADABLE = (
-    zipfile.BadZipFile,
-    zlib.error,
-    KeyError,
-    ValueError,
-    TypeError,
-    EOFError,
-    OSError,
-    RuntimeError,
-    SyntaxError,
-    MemoryError,
-)
 
 
 def write_atomically(path: str | PathLike[str], write: Callable[[IO[bytes]], object]) -> None:
@@ -88,7 +72,7 @@ def read_archive(
         raise FileFormatError(path, f"a {expected_format} file", "no file of that name") from error
     except IsADirectoryError as error:
         raise FileFormatError(path, f"a {expected_format} file", "a folder") from error
-    except UNREADABLE as error:
+    except Exception as error:  # damaged bytes make NumPy, zipfile and zlib raise nearly anything
         raise FileFormatError(
             path, f"a {expected_format} file", f"something else ({type(error).__name__})"
         ) from error

@@ -86,6 +86,11 @@ class StereoRig:
         """
         return np.array([0.0, 0.0, 1.0]) if self.is_mounted else np.array([0.0, -1.0, 0.0])
 
+    @property
+    def forward(self) -> Floats:
+        """Direction of forward, shape (3,) [base_link]: x of a base, the camera's own axis else."""
+        return np.array([1.0, 0.0, 0.0]) if self.is_mounted else np.array([0.0, 0.0, 1.0])
+
     def triangulate(self, pixels: npt.ArrayLike) -> Triangulated:
         """Return the 3-D points of matched pixels, dropping those that have none.
 

@@ -77,7 +77,7 @@ class Features:
         spread = as_floats("covariance", covariance, (None, *ends, 3, 3))
         if ids is None:
             return cls(positions, spread, np.full(len(positions), -1, dtype=np.int64))
-        return cls(positions, spread, np.asarray(ids, dtype=np.int64))
+        return cls(positions, spread, _as_ids("ids", ids))
 
     def select(self, keep: npt.NDArray[np.generic]) -> Features:
         """Return the features that a mask or an index array picks."""
@@ -181,11 +181,20 @@ class View:
 def _kept(ids: npt.ArrayLike | None, kept: npt.NDArray[np.bool_], name: str) -> Ints | None:
     if ids is None:
         return None
-    array = np.asarray(ids, dtype=np.int64)
+    array = _as_ids(name, ids)
     if array.shape != kept.shape:
         raise InputError(name, f"shape {kept.shape}", f"shape {array.shape}")
     picked: Ints = array[kept]
     return picked
+
+
+def _as_ids(name: str, ids: npt.ArrayLike) -> Ints:
+    array = np.asarray(ids)
+    if array.ndim != 1 or (array.size and array.dtype.kind not in "iu"):
+        raise InputError(
+            name, "whole numbers of shape (n,)", f"{array.dtype} of shape {array.shape}"
+        )
+    return array.astype(np.int64)
 
 
 def _no_features(ends: tuple[int, ...]) -> Features:

@@ -56,7 +56,7 @@ class Capped(Average):
     cap: int = 50
 
     def __post_init__(self) -> None:
-        if not self.cap >= 1:
+        if not isinstance(self.cap, int) or self.cap < 1:
             raise InputError("cap", "a count of 1 or more", str(self.cap))
 
     def update(self, confidence: Floats32, count: Counts, z: Floats32) -> None:

@@ -54,6 +54,8 @@ class ConfidenceGrid:
         frame: str = "map",
         rule: UpdateRule | None = None,
     ) -> None:
+        if not isinstance(frame, str):
+            raise InputError("frame", "a name", repr(frame))
         if not (np.isfinite(resolution) and resolution > 0):
             raise InputError("resolution", "a number above 0 [m]", str(resolution))
         if len(origin) not in TILE_SHAPES:
@@ -289,11 +291,31 @@ class ConfidenceGrid:
                 frame=header["frame"],
                 rule=rule_from(header["rule"]),
             )
-            for name, kind in LAYERS.items():
-                layer = arrays[name].astype(kind, casting="equiv")
-                for row, index in enumerate(arrays["tiles"].tolist()):
-                    getattr(grid.tile(tuple(index)), name)[...] = layer[row]
+            indices = _check_tiles(arrays, grid)
+            for row, index in enumerate(indices):
+                tile = grid.tile(index)
+                for name in LAYERS:
+                    getattr(tile, name)[...] = arrays[name][row]
             grid.trajectory = as_floats("trajectory", arrays["trajectory"], (None, 3))
-        except (KeyError, TypeError, ValueError, IndexError) as error:
+            check_finite("trajectory", grid.trajectory)
+        except (KeyError, TypeError, ValueError) as error:
             raise FileFormatError(path, "a complete map file", f"{error}") from error
         return grid
+
+
+def _check_tiles(arrays: dict[str, npt.NDArray[Any]], grid: ConfidenceGrid) -> list[Index]:
+    """Return the indices of a file's tiles, once these and the layers are what `save` writes."""
+    tiles = arrays["tiles"]
+    if tiles.dtype != np.int64 or tiles.shape[1:] != (grid.ndim,):
+        raise InputError("tiles", f"int64, shape (n, {grid.ndim})", f"{tiles.dtype}, {tiles.shape}")
+    indices = [tuple(index) for index in tiles.tolist()]
+    if len(set(indices)) != len(indices):
+        raise InputError("tiles", "each tile once", "one that comes twice")
+    shape = (len(indices), *grid.tile_shape)
+    for name, kind in LAYERS.items():
+        if arrays[name].dtype != kind or arrays[name].shape != shape:
+            got = f"{arrays[name].dtype}, {arrays[name].shape}"
+            raise InputError(name, f"{np.dtype(kind)}, shape {shape}", got)
+    if not (np.abs(arrays["confidence"]) <= 1.0).all():
+        raise InputError("confidence", "numbers in [-1, 1]", "others")
+    return indices

@@ -31,6 +31,7 @@ class FlatView(NamedTuple):
     segments: Ints  #: shape (m, 2), rows of `points`
     supports: Floats  #: shape (k, 2) [m, view], where the ground itself was seen
     support_heights: Floats  #: shape (k,) [m]
+    feature: Ints  #: shape (n + k,), which feature of the view each point and support is of
     drop_offs: Floats  #: shape (b, 2) [m, view], features below the ground
     used: int  #: features that are in any of the above
     dropped: Counter[str]  #: features that are not, by reason
@@ -44,6 +45,7 @@ class _Heights(NamedTuple):
     height: Floats
     tolerance: Floats
     radius: Floats  # horizontal distance from the camera [m]
+    feature: Ints  # number in the view, points first
 
     def at(self, t: Floats) -> _Heights:
         """Interpolate along segments: `t`, shape (m, j), 0 at the first end, 1 at the second."""
@@ -60,6 +62,7 @@ class _Heights(NamedTuple):
             blend(self.height),
             blend(self.tolerance),
             np.hypot(xy[..., 0], xy[..., 1]),
+            np.broadcast_to(self.feature[:, :1], t.shape),
         )
 
 
@@ -85,26 +88,27 @@ def flatten(view: View, settings: MapperSettings) -> FlatView:
     T_map_camera = view.T_map_camera
     forward = T_map_camera[:2, 2] / np.hypot(T_map_camera[0, 2], T_map_camera[1, 2])
     dropped = Counter(view.dropped)
+    points = _measure(view.points, view, plane, forward, settings)
+    segments = _measure(view.segments, view, plane, forward, settings)
+    segments.feature[...] += len(view.points)
     parts = [
-        _point_classes(_measure(view.points, view, plane, forward, settings), settings, dropped),
-        _segment_classes(
-            _measure(view.segments, view, plane, forward, settings), settings, dropped
-        ),
+        _point_classes(points, settings, dropped),
+        _segment_classes(segments, settings, dropped),
     ]
-    obstacles = [part.obstacles for part in parts]
+    obstacles, grounds = [part.obstacles for part in parts], [part.ground for part in parts]
     n_points = len(obstacles[0].xy)
     ends = np.arange(n_points, n_points + len(obstacles[1].xy), dtype=np.int64)
-    height = np.concatenate([part.height for part in obstacles])
     return FlatView(
         viewpoint=T_map_camera[:2, 3],
         forward=forward,
         camera_height=float(plane.height(view.rig.T_base_camera[:3, 3])),
         points=np.concatenate([part.xy for part in obstacles]),
         covariance=np.concatenate([part.covariance for part in obstacles]),
-        heights=height,
+        heights=np.concatenate([part.height for part in obstacles]),
         segments=ends.reshape(-1, 2),
-        supports=np.concatenate([part.ground.xy for part in parts]),
-        support_heights=np.concatenate([part.ground.height for part in parts]),
+        supports=np.concatenate([part.xy for part in grounds]),
+        support_heights=np.concatenate([part.height for part in grounds]),
+        feature=np.concatenate([part.feature for part in (*obstacles, *grounds)]),
         drop_offs=np.concatenate([part.below for part in parts]),
         used=sum(part.used for part in parts),
         dropped=+dropped,
@@ -130,7 +134,11 @@ def _measure(
     height += float(plane.height(view.rig.T_base_camera[:3, 3]))
     sigma = np.sqrt(np.einsum("i,...ij,j->...", up, features.covariance, up))
     tolerance = np.maximum(settings.step_height, 2.0 * sigma + radius * plane.sigma_tilt)
-    return _Heights(xy, axes @ features.covariance @ axes.T, height, tolerance, radius)
+    # Both ends of a segment carry its number.
+    number = np.arange(len(features)).reshape(-1, *(1,) * (radius.ndim - 1)) + np.zeros_like(
+        radius, dtype=np.int64
+    )
+    return _Heights(xy, axes @ features.covariance @ axes.T, height, tolerance, radius, number)
 
 
 class _Classes(NamedTuple):
@@ -146,7 +154,7 @@ def _point_classes(points: _Heights, settings: MapperSettings, dropped: Counter[
     inside = ~near & ~far
     overhead = inside & (points.height > settings.robot_height)
     below = inside & (points.height < -points.tolerance)
-    ground = inside & (np.abs(points.height) <= points.tolerance)
+    ground = inside & ~overhead & (np.abs(points.height) <= points.tolerance)
     obstacle = inside & ~overhead & ~below & ~ground
     dropped.update(
         too_near=int(near.sum()), out_of_range=int(far.sum()), overhead=int(overhead.sum())

@@ -105,7 +105,7 @@ class GroundMapper:
         with self.stages.timed("fuse"):
             self.grid.fuse(parts.evidence.lower, parts.evidence.z)
             self.grid.add_drop_offs(drop_off_cells(parts.flat, self.grid))
-            self.grid.trajectory = np.concatenate([self.grid.trajectory, _pose2d(view, parts.flat)])
+            self.grid.trajectory = np.concatenate([self.grid.trajectory, _pose2d(view)])
         self.stats.views += 1
         self.stats.features_used += parts.flat.used
         self.stats.features_dropped.update(parts.flat.dropped)
@@ -127,9 +127,9 @@ class GroundMapper:
         return ViewParts(flat, mesh, surfaces, fan, evidence)
 
 
-def _pose2d(view: View, flat: FlatView) -> Floats:
-    yaw = np.arctan2(flat.forward[1], flat.forward[0])
-    return np.array([[*view.T_map_base[:2, 3], yaw]])
+def _pose2d(view: View) -> Floats:
+    heading = view.T_map_base[:3, :3] @ view.rig.forward
+    return np.array([[*view.T_map_base[:2, 3], np.arctan2(heading[1], heading[0])]])
 
 
 def warm_up(settings: MapperSettings) -> None:

@@ -81,7 +81,7 @@ def visible_freespace(flat: FlatView, surfaces: Surfaces, settings: MapperSettin
 
 
 def seen_through(flat: FlatView, fan: SightFan, surfaces: Surfaces) -> int:
-    """Count features whose line of sight passes below the top of a surface in front of them.
+    """Count the features whose line of sight passes below the top of a surface in front of them.
 
     Features that are seen over a surface are behind it, as they should be; these contradict it.
     """
@@ -95,6 +95,7 @@ def seen_through(flat: FlatView, fan: SightFan, surfaces: Surfaces) -> int:
         covered = (bearing >= fan.bearings[piece, 0]) & (bearing <= fan.bearings[piece, 1])
         covered &= fan.surface[piece] != NO_SURFACE
     points, heights, piece = points[covered], heights[covered], piece[covered]
+    feature = flat.feature[covered]
     row = fan.surface[piece]
     ends = surfaces.ends[row]
     edge = ends[:, 1] - ends[:, 0]
@@ -105,7 +106,7 @@ def seen_through(flat: FlatView, fan: SightFan, surfaces: Surfaces) -> int:
     top = (1 - t) * surfaces.tops[row, 0] + t * surfaces.tops[row, 1]
     behind = (1.0 - share) * np.hypot(points[:, 0], points[:, 1]) > 2 * reach + 0.05
     sight = flat.camera_height + (heights - flat.camera_height) * share
-    return int((behind & (sight < top)).sum())
+    return len(np.unique(feature[behind & (sight < top)]))
 
 
 def _support_chords(supports: Floats, settings: MapperSettings) -> Floats:

@@ -35,7 +35,7 @@ class Surfaces(NamedTuple):
     kind: Bytes  #: shape (s,), `SurfaceKind`
     discs: Floats  #: shape (s,) [m], radius of a lone point's disc; 0 for the others
     frontiers: Floats  #: shape (f, 2, 2) [m, view], links too long to believe
-    through_viewpoint: int  #: edges dropped because they lie within `min_range`
+    through_viewpoint: int  #: edges and lone points dropped because they lie within `min_range`
 
 
 class _Vertices(NamedTuple):
@@ -81,6 +81,9 @@ def find_surfaces(flat: FlatView, mesh: Mesh, settings: MapperSettings) -> Surfa
     )
     ends = pieces.at(vertices)
     discs = _discs(vertices, mesh.edges[believed], ends)
+    away = np.hypot(discs.xy[:, 0], discs.xy[:, 1]) >= settings.min_range
+    blocked += int((~away).sum())
+    discs = _Vertices(*(values[away] for values in discs))
     radius = np.maximum(0.5 * settings.resolution, discs.sigma)
     everything = np.concatenate([ends.xy, _silhouettes(discs.xy, radius)])
     half_cell = np.full(len(radius), 0.5 * settings.resolution)

@@ -8,8 +8,6 @@ import numpy as np
 import numpy.typing as npt
 import pythoncdt as cdt
 import shapely
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from groundmap.arrays import Bools, Floats, Ints, as_floats, check_finite
@@ -99,17 +97,23 @@ def _nothing() -> Mesh:
 
 
 def _merge_duplicates(xy: Floats) -> tuple[Floats, Ints]:
-    """Return the vertices and, for each point, which one it became (the first of its group)."""
-    pairs = KDTree(xy).query_pairs(MERGE_DISTANCE, output_type="ndarray")
-    if len(pairs) == 0:
-        return xy, np.arange(len(xy))
-    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(xy),) * 2)
-    _, group = connected_components(graph, directed=False)
-    _, first, source = np.unique(group, return_index=True, return_inverse=True)
-    order = np.argsort(first)  # keep the input's order, so that results don't hang on labels
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    return xy[first[order]], rank[source].astype(np.int64)
+    """Return the vertices and, for each point, which one it became.
+
+    The first of a group of near points stands for all within a millimetre of itself, so that no
+    point moves farther than that, however long a chain of near points is.
+    """
+    _, first, group = np.unique(xy, axis=0, return_index=True, return_inverse=True)
+    stands_for = first[group.reshape(-1)]  # equal points first: they would be pairs by the square
+    distinct = np.sort(first)
+    pairs = KDTree(xy[distinct]).query_pairs(MERGE_DISTANCE, output_type="ndarray")
+    absorbed: dict[int, int] = {}
+    for i, j in sorted(map(tuple, np.sort(distinct[pairs], axis=1).tolist())):
+        if i not in absorbed and j not in absorbed:
+            absorbed[j] = i
+    for point, vertex in absorbed.items():
+        stands_for[stands_for == point] = vertex
+    kept = np.unique(stands_for)
+    return xy[kept], np.searchsorted(kept, stands_for)
 
 
 def _insert(vertices: Floats, constraints: Ints, source: Ints) -> Mesh:
@@ -202,6 +206,7 @@ def _noded(vertices: Floats, constraints: Ints, source: Ints) -> Mesh:
     crossings = _segments_through(mesh.points[n_inputs:], lattice, constraints)
     crossings[:, 0] += n_inputs
     crossings[:, 1:] = vertex[crossings[:, 1:]]
+    crossings = crossings[crossings[:, 1] != crossings[:, 2]]  # ends that fell on one node
     return mesh._replace(points=mesh.points * NODING_GRID, crossings=crossings)
 
 

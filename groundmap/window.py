@@ -74,7 +74,9 @@ def cells_of(xy: npt.ArrayLike, origin: Floats, resolution: float) -> Ints:
         "xy", np.atleast_2d(np.asarray(xy, dtype=np.float64)), (None, len(origin))
     )
     check_finite("xy", positions)
-    return np.floor((positions - origin) / resolution).astype(np.int64)[:, ::-1]
+    # Beyond what int64 holds there is nothing: any far cell will do.
+    scaled = np.clip((positions - origin) / resolution, -(2.0**62), 2.0**62)
+    return np.floor(scaled).astype(np.int64)[:, ::-1]
 
 
 def centres_of(cells: npt.ArrayLike, origin: Floats, resolution: float) -> Floats:

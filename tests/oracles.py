@@ -71,9 +71,7 @@ def without_segment(mesh: Mesh, segments: Ints, tolerance: float) -> list[int]:
     if len(ends) == 0:
         return list(range(len(pieces)))
     around = shapely.buffer(shapely.linestrings(mesh.points[ends]), 1.01 * tolerance)
-    return [
-        row for row, piece in enumerate(pieces) if not shapely.covers(around, piece).any()
-    ]
+    return [row for row, piece in enumerate(pieces) if not shapely.covers(around, piece).any()]
 
 
 def components(mesh: Mesh) -> int:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from groundmap import StereoRig, View
 from groundmap.arrays import Floats, Ints
@@ -238,25 +239,26 @@ def _features(places: Floats, sigma: float, camera_height: float) -> Features:
 
 @st.composite
 def views(draw: st.DrawFn) -> View:
-    """A view of obstacles and ground 1 m to 20 m ahead, in general position."""
+    """A view of obstacles, ground and a few strays 1 m to 20 m ahead, in general position."""
     rng, mounted = draw(rngs()), draw(st.booleans())
     height = MOUNT_HEIGHT if mounted else float(rng.uniform(0.6, 1.6))
     return random_view(rng, mounted=mounted, camera_height=height)
 
 
 def random_view(rng: np.random.Generator, *, mounted: bool, camera_height: float) -> View:
-    """Build a view from obstacle points and segments and ground points."""
+    """Build a view of a camera that leans a little from points and segments around it."""
     stereo = rig(mounted=mounted)
     points = _ahead(rng, int(rng.integers(0, 25)), camera_height, 0.2, 1.9)
     ground = _ahead(rng, int(rng.integers(0, 25)), camera_height, -0.05, 0.05)
+    strays = _ahead(rng, int(rng.integers(0, 6)), camera_height, -2.0, 4.0)
     starts = _ahead(rng, int(rng.integers(0, 8)), camera_height, 0.0, 2.2)
     stops = starts + rng.normal(scale=(1.0, 0.3, 1.0), size=starts.shape)
     stops[:, 2] = np.maximum(stops[:, 2], 0.5)
-    seen = stereo.triangulate(pixels_of(stereo, np.concatenate([points, ground])))
+    seen = stereo.triangulate(pixels_of(stereo, np.concatenate([points, ground, strays])))
     lines = stereo.triangulate(pixels_of(stereo, np.stack([starts, stops], axis=1)))
     x, y, yaw = rng.uniform((-30.0, -30.0, -np.pi), (30.0, 30.0, np.pi))
     return View(
-        T_map_base=pose(x, y, yaw, mounted=mounted),
+        T_map_base=pose(x, y, yaw, mounted=mounted) @ _lean(rng),
         rig=stereo,
         points=Features.points(seen.xyz, seen.covariance),
         segments=Features.segments(lines.xyz, lines.covariance),
@@ -264,10 +266,16 @@ def random_view(rng: np.random.Generator, *, mounted: bool, camera_height: float
     )
 
 
+def _lean(rng: np.random.Generator) -> Floats:
+    transform = np.eye(4)
+    transform[:3, :3] = Rotation.from_rotvec(rng.normal(scale=0.03, size=3)).as_matrix()
+    return transform
+
+
 def _ahead(
     rng: np.random.Generator, count: int, camera_height: float, low: float, high: float
 ) -> Floats:
     """Points within 45 degrees of the optical axis, heights above ground from low to high."""
-    depth = rng.uniform(1.0, 14.0, size=count)
+    depth = rng.uniform(1.0, 16.0, size=count)
     side = depth * rng.uniform(-1.0, 1.0, size=count)
     return np.stack([side, camera_height - rng.uniform(low, high, size=count), depth], axis=1)

@@ -308,6 +308,8 @@ confidences = st.floats(-1.0, 1.0, width=32)
 
 @given(confidences, st.integers(0, 5), st.integers(0, 5), st.sampled_from([0.01, 0.2]))
 @example(0.0, 2, 0, 0.01)
+@example(float(np.float32(0.01)), 1, 0, 0.01)
+@example(-float(np.float32(0.01)), 1, 0, 0.01)
 @example(0.0, 0, 3, 0.01)
 def test_a_cell_has_one_of_four_states(
     value: float, count: int, drops: int, epsilon: float

@@ -242,6 +242,18 @@ def test_too_few_features_with_no_plane_before_are_refused_with_what_to_do(
         next(fit_ground(views, causal=True))
 
 
+def test_of_two_levels_the_ground_is_the_lower_even_with_fewer_features() -> None:
+    rng = np.random.default_rng(8)
+    n = 400
+    raised = rng.random(n) < 0.55  # 0.7 m above the road, as the tops of a row of cars
+    xyz = np.column_stack(
+        [rng.uniform(-5, 5, n), np.where(raised, 0.9, 1.6), rng.uniform(3, 12, n)]
+    )
+    view = View(T_map_base=T_REP103_OPTICAL, rig=RIG, points=look(rng, xyz))
+    (standing,) = fit_ground([view])
+    assert plane_of(standing).offset == pytest.approx(1.6, abs=0.03)
+
+
 def test_features_on_one_line_are_no_plane() -> None:
     along = np.linspace(3, 15, 50)
     xyz = np.column_stack([np.zeros(50), np.full(50, 1.6), along])

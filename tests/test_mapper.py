@@ -278,7 +278,17 @@ A = (2.0, 0.0, 0.5)
 @example([], [(A, A)], 0.0, 0.05, "ellipsoid")  # no length
 @example([], [((2.0, 0.0, 0.0), (2.0, 0.0, 4.0))], 0.0, 0.05, "ellipsoid")  # vertical
 @example([], [((-0.5, 0.0, 0.0), (0.5, 0.0, 0.0))], 45.0, 0.05, "ellipsoid")  # below the camera
-@example([], [((0.0, 0.0, -2.0), (0.0, 0.0, -2.0))], 30.0, 3.0, "ellipsoid")  # at the viewpoint
+# Ends right below the camera, as ground, as an obstacle, and beside another surface.
+@example([], [((0.0, 0.0, -2.0), (0.0, 0.0, -2.0))], 30.0, 3.0, "ellipsoid")
+@example([], [((0.0, 0.0, -0.1), (0.0, 0.0, 0.5))], 30.0, 0.0, "ellipsoid")
+@example([], [((0.0, 0.0, -2.0), (0.0, 0.0, 0.5))], 30.0, 0.0, "ellipsoid")
+@example(
+    [],
+    [((0.0, 0.0, -2.0), (0.5, 0.0, 0.5)), ((0.0, 0.0, 0.0), (0.0, 0.5, -2.0))],
+    30.0,
+    0.0,
+    "ellipsoid",
+)
 @example([(0.5, 0.0, 2.5)], [], 0.0, 3.0, "ellipsoid")  # overhead, and as uncertain as high
 def test_no_view_is_too_degenerate_to_be_mapped_and_accounted_for(
     points: list[tuple[float, float, float]],
@@ -327,6 +337,13 @@ def test_a_vertical_segment_is_an_obstacle_where_it_stands() -> None:
     mapper = mapped([view_of(np.empty((0, 3)), pole)], resolution=0.1)
     assert mapper.grid.confidence_at((3.0, 0.05)) == 1.0
     assert mapper.stats.features_used == 1
+
+
+def test_a_pole_nearer_than_min_range_is_no_obstacle() -> None:
+    # As a point there is none: a disc at the viewpoint would hide half the view.
+    pole = np.array([[(0.1, 0.0, 0.2), (0.1, 0.0, 0.6)]])
+    grid = mapped([view_of(np.empty((0, 3)), pole, seen_by=rig(pitch=45.0))]).grid
+    assert grid.area(CellState.NONFREE) == 0.0
 
 
 def test_features_dropped_by_the_view_are_in_the_figures() -> None:

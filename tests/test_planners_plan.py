@@ -137,9 +137,25 @@ def test_a_footprint_over_unknown_or_contested_space_is_named(
     assert plan(allowed).audit == "clean"
 
 
-def test_nonfree_comes_before_unknown() -> None:
+@pytest.mark.parametrize(
+    ("at_goal", "beside", "error", "sentence"),
+    [
+        (UNSEEN, BLOCKED, UnknownSpaceError, "overlaps unknown or contested space"),
+        (BLOCKED, UNSEEN, NonFreeError, "overlaps non-free space"),
+    ],
+)
+def test_the_state_of_the_place_itself_comes_before_what_is_near(
+    at_goal: float, beside: float, error: type[NoRouteError], sentence: str
+) -> None:
     z = free_field(64, 64)
-    z[20, 20], z[22, 20] = BLOCKED, UNSEEN
+    z[22, 20], z[20, 20] = at_goal, beside
+    with pytest.raises(error, match=sentence):
+        plan(problem(grid_of(z), goal=(20.5, 22.5), footprint=2))
+
+
+def test_nonfree_beside_a_free_place_comes_before_unknown() -> None:
+    z = free_field(64, 64)
+    z[20, 20], z[24, 20] = BLOCKED, UNSEEN
     with pytest.raises(NonFreeError, match="overlaps non-free space"):
         plan(problem(grid_of(z), goal=(20.5, 22.5), footprint=2))
 

@@ -216,9 +216,7 @@ def uncertain(room: Cloud, rng: np.random.Generator) -> FlatView:
 
 @settings(max_examples=100)
 @given(rooms(), rngs())
-def test_freespace_ends_a_reach_before_the_surface(
-    room: Cloud, rng: np.random.Generator
-) -> None:
+def test_freespace_ends_a_reach_before_the_surface(room: Cloud, rng: np.random.Generator) -> None:
     fan, surfaces = seen(uncertain(room, rng), SPREAD)
     for ends, free, row in zip(fan.ends, fan.free, fan.surface, strict=True):
         if row == NO_SURFACE:

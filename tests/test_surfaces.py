@@ -136,9 +136,7 @@ def test_ends_turn_counter_clockwise_around_the_viewpoint(room: Cloud) -> None:
 
 
 def test_values_turn_with_the_ends() -> None:
-    flat = flat_view(
-        [(5, 2), (5, -2)], [(0, 1)], heights=[1.8, 0.4], covariance=[0.3**2, 0.1**2]
-    )
+    flat = flat_view([(5, 2), (5, -2)], [(0, 1)], heights=[1.8, 0.4], covariance=[0.3**2, 0.1**2])
     surfaces = surfaces_of(flat)
     np.testing.assert_array_equal(surfaces.ends[0], [(5, -2), (5, 2)])
     np.testing.assert_array_equal(surfaces.tops[0], [0.4, 1.8])
@@ -201,9 +199,7 @@ def test_a_crossing_is_as_high_as_the_segments_there_for_links_too() -> None:
     """A point 0.5 m beside a crossing links with the band between 0.5 m and 1.2 m."""
     ends = [(4, -1), (8, 3), (4, 1), (8, -3)]
     for height, linked in ((1.6, True), (1.8, False)):
-        flat = flat_view(
-            [*ends, (4.7, 0)], [(0, 1), (2, 3)], heights=[0.4, 0.8, 1.0, 1.8, height]
-        )
+        flat = flat_view([*ends, (4.7, 0)], [(0, 1), (2, 3)], heights=[0.4, 0.8, 1.0, 1.8, height])
         links = pairs(of_kind(surfaces_of(flat), SurfaceKind.LINK))
         assert (frozenset([(4.7, 0.0), (5.0, 0.0)]) in links) == linked
 

@@ -1,0 +1,326 @@
+"""What one view says: one z per cell, walls before freespace, the same wherever the view stands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from oracles import Cell, cell_boxes, said, shifted, turned
+from scipy import ndimage
+from strategies import flat_view, pixels_of, pose, rig, rngs, views
+
+import groundmap
+from groundmap import GroundMapper, View
+from groundmap.arrays import Bools, Floats
+from groundmap.errors import InputError
+from groundmap.evidence import Evidence, drop_off_cells, evidence_of
+from groundmap.grid import ConfidenceGrid
+from groundmap.heights import FlatView
+from groundmap.mapper import ViewParts
+from groundmap.settings import MapperSettings
+from groundmap.sight2d import visible_freespace
+from groundmap.surfaces import SurfaceKind, find_surfaces
+from groundmap.triangulation import triangulate
+from groundmap.window import CellState
+
+RESOLUTION = 0.125
+MODELS = ["ellipsoid", "radius", "none"]
+SLACK = 1e-9  # [m], what rounding may add to a cell
+
+
+def explained(view: View, **options: Any) -> ViewParts:
+    return GroundMapper(**{"resolution": RESOLUTION, **options}).explain(view)
+
+
+def by_hand(flat: FlatView, **options: Any) -> ViewParts:
+    """The steps of `GroundMapper.explain` from a flat view on."""
+    chosen = MapperSettings(**{"resolution": RESOLUTION, **options})
+    mesh = triangulate(flat.points, flat.segments)
+    surfaces = find_surfaces(flat, mesh, chosen)
+    fan = visible_freespace(flat, surfaces, chosen)
+    grid = ConfidenceGrid(resolution=chosen.resolution)
+    return ViewParts(flat, mesh, surfaces, fan, evidence_of(flat, surfaces, fan, grid, chosen))
+
+
+def in_map(flat: FlatView, xy: Floats) -> Floats:
+    x, y = flat.forward
+    return flat.viewpoint + xy @ np.array([(x, y), (-y, x)])
+
+
+def lines(parts: ViewParts) -> Floats:
+    """Segments and links as shapely lines in the map."""
+    edges = parts.surfaces.ends[parts.surfaces.kind != SurfaceKind.LONE]
+    found: Floats = shapely.linestrings(in_map(parts.flat, edges))
+    return found
+
+
+def discs(parts: ViewParts) -> Floats:
+    """Discs of lone points in the map."""
+    lone = parts.surfaces.kind == SurfaceKind.LONE
+    middles = in_map(parts.flat, parts.surfaces.ends[lone].mean(axis=1))
+    found: Floats = shapely.buffer(
+        shapely.points(middles), parts.surfaces.discs[lone], quad_segs=64
+    )
+    return found
+
+
+def spreads(parts: ViewParts) -> Floats:
+    """What each surface sweeps when it moves by its reach along the rays, in the map."""
+    ends, reach = parts.surfaces.ends, parts.surfaces.reach
+    share = (reach / np.hypot(ends[..., 0], ends[..., 1]))[..., None]
+    corners = np.concatenate([ends * (1 - share), ends * (1 + share)], axis=1)
+    found: Floats = shapely.convex_hull(shapely.multipoints(in_map(parts.flat, corners)))
+    return found
+
+
+def boxes(cells: list[Cell]) -> Floats:
+    return cell_boxes(cells, RESOLUTION)
+
+
+def middles(evidence: Evidence) -> Floats:
+    """Centres (x, y) of all cells of the block [m, map]."""
+    rows, cols = np.indices(evidence.z.shape)
+    corner = np.stack([cols + evidence.lower[1], rows + evidence.lower[0]], axis=-1)
+    return (corner + 0.5) * RESOLUTION
+
+
+@settings(max_examples=40)
+@given(views(), st.sampled_from(MODELS))
+def test_each_cell_is_spoken_of_once_and_within_bounds(view: View, model: str) -> None:
+    evidence = explained(view, uncertainty=model).evidence
+    assert (np.abs(evidence.z) <= 1.0).all()
+    cells = evidence.cells()
+    assert len(np.unique(cells, axis=0)) == len(cells) == np.count_nonzero(evidence.z)
+    assert set(np.unique(evidence.z[evidence.z < 0])) <= {np.float32(-1.0)}
+
+
+@settings(max_examples=40)
+@given(views(), st.sampled_from(MODELS))
+def test_a_cell_that_a_surface_passes_is_never_free(view: View, model: str) -> None:
+    parts = explained(view, uncertainty=model)
+    z = said(parts.evidence)
+    free = boxes([cell for cell, value in z.items() if value < 0])
+    tree = shapely.STRtree(free)
+    for line in lines(parts):
+        near = free[tree.query(line)]
+        assert shapely.length(shapely.intersection(near, line)).max(initial=0.0) < SLACK
+
+
+@settings(max_examples=40)
+@given(views(), st.sampled_from(["ellipsoid", "none"]))
+def test_cells_that_surfaces_pass_are_sure_to_be_nonfree(view: View, model: str) -> None:
+    parts = explained(view, uncertainty=model)
+    z = parts.evidence.z
+    x, y = np.moveaxis(middles(parts.evidence), -1, 0)
+    squares = shapely.box(
+        x - RESOLUTION / 2, y - RESOLUTION / 2, x + RESOLUTION / 2, y + RESOLUTION / 2
+    ).reshape(-1)
+    tree = shapely.STRtree(squares)
+    for line in lines(parts):
+        near = tree.query(line)
+        passed = near[shapely.length(shapely.intersection(squares[near], line)) > SLACK]
+        assert (z.reshape(-1)[passed] == 1.0).all()
+
+
+@settings(max_examples=40)
+@given(views())
+def test_without_spread_only_surfaces_and_discs_are_nonfree(view: View) -> None:
+    parts = explained(view, uncertainty="none")
+    z = said(parts.evidence)
+    nonfree = [cell for cell, value in z.items() if value > 0]
+    shapes = shapely.union_all([*lines(parts), *discs(parts)])
+    assert (shapely.distance(boxes(nonfree), shapes) < SLACK).all()
+    assert all(z[cell] == 1.0 for cell in nonfree)
+
+
+@settings(max_examples=40)
+@given(views())
+def test_the_spread_lies_along_the_rays(view: View) -> None:
+    parts = explained(view, uncertainty="ellipsoid")
+    z = said(parts.evidence)
+    assert all(0.0 < value <= 1.0 for value in z.values() if value > 0)
+    in_spread = [cell for cell, value in z.items() if 0 < value < 1]
+    swept = shapely.union_all(spreads(parts))
+    assert (shapely.distance(boxes(in_spread), swept) < SLACK).all()
+    sure = [cell for cell, value in z.items() if value == 1.0]
+    anything = shapely.union_all([swept, *discs(parts)])
+    assert (shapely.distance(boxes(sure), anything) < SLACK).all()
+
+
+@settings(max_examples=40)
+@given(views())
+def test_what_a_segment_sweeps_along_the_rays_is_nonfree(view: View) -> None:
+    parts = explained(view, uncertainty="ellipsoid")
+    x, y = np.moveaxis(middles(parts.evidence), -1, 0)
+    for spread in spreads(parts)[parts.surfaces.kind != SurfaceKind.LONE]:
+        inside = shapely.contains_xy(spread.buffer(-SLACK), x, y)
+        assert (parts.evidence.z[inside] > 0).all()
+
+
+@settings(max_examples=40)
+@given(views(), st.sampled_from(MODELS))
+def test_free_cells_are_those_of_the_fan_that_no_surface_claims(view: View, model: str) -> None:
+    parts = explained(view, uncertainty=model)
+    triangles = np.concatenate([np.zeros((len(parts.fan.free), 1, 2)), parts.fan.free], axis=1)
+    fan = shapely.union_all(shapely.buffer(shapely.polygons(in_map(parts.flat, triangles)), 1e-10))
+    x, y = np.moveaxis(middles(parts.evidence), -1, 0)
+    inside = shapely.contains_xy(fan, x, y)
+    np.testing.assert_array_equal(parts.evidence.z < 0, inside & (parts.evidence.z <= 0))
+
+
+def moved(view: View, transform: Floats) -> View:
+    return replace(view, T_map_base=transform @ view.T_map_base)
+
+
+@settings(max_examples=60)
+@given(views(), st.sampled_from(MODELS), st.tuples(st.integers(-80, 80), st.integers(-80, 80)))
+def test_a_view_moved_by_whole_cells_says_the_same_there(
+    view: View, model: str, cells: tuple[int, int]
+) -> None:
+    rows, cols = cells
+    shift = np.eye(4)
+    shift[:2, 3] = cols * RESOLUTION, rows * RESOLUTION
+    here = explained(view, uncertainty=model).evidence
+    there = explained(moved(view, shift), uncertainty=model).evidence
+    assert said(there) == shifted(said(here), rows, cols)
+
+
+@settings(max_examples=60)
+@given(views(), st.sampled_from(MODELS), st.integers(1, 3))
+def test_a_view_turned_by_quarters_says_the_same_turned(
+    view: View, model: str, quarters: int
+) -> None:
+    quarter = np.array([[0.0, -1.0, 0, 0], [1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, 0, 0, 1.0]])
+    expected = said(explained(view, uncertainty=model).evidence)
+    for _ in range(quarters):
+        view, expected = moved(view, quarter), turned(expected)
+    assert said(explained(view, uncertainty=model).evidence) == expected
+
+
+@settings(max_examples=40)
+@given(rngs())
+def test_the_radius_spreads_a_wall_alike_to_all_sides(rng: np.random.Generator) -> None:
+    sigma = float(rng.uniform(0.1, 0.5))
+    wall = rng.uniform((4.0, -3.0), (10.0, 3.0), size=(2, 2))
+    parts = by_hand(
+        flat_view(wall, [(0, 1)], covariance=sigma**2), uncertainty="radius", robot_height=2.0
+    )
+    x, y = np.moveaxis(middles(parts.evidence), -1, 0)
+    distance = shapely.distance(shapely.points(x, y), shapely.LineString(wall))
+    nonfree = parts.evidence.z > 0
+    assert nonfree[distance < 2 * sigma - SLACK].all()
+    assert not nonfree[distance > 2 * sigma + RESOLUTION].any()
+    np.testing.assert_allclose(
+        parts.evidence.z[nonfree], min(1.0, RESOLUTION / (4 * sigma)), rtol=1e-6
+    )
+
+
+@settings(max_examples=40)
+@given(rngs())
+def test_the_radius_spreads_a_lone_point_alike_to_all_sides(rng: np.random.Generator) -> None:
+    sigma = float(rng.uniform(0.1, 0.5))
+    place = rng.uniform((4.0, -3.0), (10.0, 3.0))
+    parts = by_hand(flat_view([place], covariance=sigma**2), uncertainty="radius")
+    distance = np.hypot(*np.moveaxis(middles(parts.evidence) - place, -1, 0))
+    nonfree = parts.evidence.z > 0
+    assert nonfree[distance < 2 * sigma - SLACK].all()
+    assert not nonfree[distance > 2 * sigma + RESOLUTION].any()
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_lone_point_keeps_its_own_cell_nonfree(model: str) -> None:
+    parts = by_hand(flat_view([(5.06, 1.07)], covariance=1e-6), uncertainty=model)
+    assert said(parts.evidence)[(8, 40)] > 0
+
+
+def test_nothing_seen_says_nothing() -> None:
+    assert said(by_hand(flat_view()).evidence) == {}
+
+
+def test_the_resolution_is_refused_if_a_view_takes_too_many_cells() -> None:
+    flat = flat_view([(9, -9), (9, 9)], [(0, 1)])
+    with pytest.raises(InputError, match=r"resolution: expected one that cuts a view into"):
+        by_hand(flat, resolution=1e-4)
+
+
+def test_drop_offs_are_counted_once_per_cell() -> None:
+    flat = flat_view(viewpoint=(0.01, 0.02), forward=(0.0, 1.0))
+    flat = flat._replace(drop_offs=np.array([(1.0, 0.5), (1.01, 0.49), (3.0, -2.0)]))
+    # Ahead is y of the map, left is -x.
+    cells = drop_off_cells(flat, ConfidenceGrid(resolution=0.5))
+    assert sorted(map(tuple, cells.tolist())) == [(2, -1), (6, 4)]
+
+
+# A doorway, 1.0 m wide, approached
+
+WALL, HALF_DOOR, EYE = 10.0, 0.5, 1.0
+
+
+def doorway(rng: np.random.Generator, distance: float) -> View:
+    """View of a wall across the way with a door in it, with half a pixel of noise."""
+    stereo = rig(mounted=True)
+    here = WALL - distance
+    sides = np.array([-1.0, 1.0])
+    posts = np.repeat(HALF_DOOR + np.array([0.0, 0.35, 0.7, 1.1, 1.5]), 2) * np.tile(sides, 5)
+    low_high = np.array([0.1, 1.9])
+    vertical = np.stack(
+        [np.stack([np.full(2, WALL), np.full(2, y), low_high], axis=1) for y in posts]
+    )
+    boards = np.array(
+        [
+            [(WALL, side * HALF_DOOR, height), (WALL, side * (HALF_DOOR + 1.6), height)]
+            for side in sides
+            for height in (0.3, 1.2, 1.8)
+        ]
+    )
+    beside = rng.uniform((HALF_DOOR, 0.2), (HALF_DOOR + 1.6, 1.9), size=(60, 2))
+    on_wall = np.column_stack([np.full(60, WALL), beside[:, 0] * np.tile(sides, 30), beside[:, 1]])
+    floor = rng.uniform((here + 0.5, -0.45), (WALL + 5.0, 0.45), size=(120, 2))
+    seen = visible_pixels(stereo, here, np.concatenate([on_wall, np.pad(floor, ((0, 0), (0, 1)))]))
+    cut = visible_pixels(stereo, here, np.concatenate([vertical, boards]))
+    return View.from_pixels(
+        pose(here - 0.2, -0.06, 0.0, mounted=True),
+        stereo,
+        points_px=seen + rng.normal(scale=0.5, size=seen.shape),
+        segments_px=cut + rng.normal(scale=0.5, size=cut.shape),
+    )
+
+
+def visible_pixels(stereo: groundmap.StereoRig, here: float, places: Floats) -> Floats:
+    """Pixels of features that lie in the images of a camera `EYE` up at x = `here`."""
+    x, y, z = np.moveaxis(places, -1, 0)
+    pixels = pixels_of(stereo, np.stack([-y, EYE - z, x - here], axis=-1))
+    inside = (pixels > 0) & (pixels < (2 * stereo.cx, 2 * stereo.cx, 2 * stereo.cy))
+    return pixels[inside.reshape(len(pixels), -1).all(axis=1)]
+
+
+def door_map(model: str) -> groundmap.ConfidenceGrid:
+    rng = np.random.default_rng(20)
+    approach = [doorway(rng, distance) for distance in np.arange(6.0, 0.9, -0.25)]
+    mapper = GroundMapper(uncertainty=model)
+    for view in groundmap.fit_ground(approach, camera_height=EYE):
+        mapper.integrate(view)
+    return mapper.grid
+
+
+def test_a_door_stays_open_and_the_wall_beside_it_closed() -> None:
+    grid = door_map("ellipsoid")
+    through = grid.window((WALL - 0.6, -0.3, WALL + 0.6, 0.3))
+    assert (through.states() == CellState.FREE).all()
+    beside = grid.window((WALL - 1.0, -1.5, WALL + 1.0, 1.5))
+    free = beside.states() == CellState.FREE
+    assert joins_front_and_back(free)
+    y = beside.cell_to_world(np.argwhere(np.ones_like(free)))[:, 1].reshape(free.shape)
+    assert not joins_front_and_back(free & (np.abs(y) > HALF_DOOR))
+
+
+def joins_front_and_back(free: Bools) -> bool:
+    """Whether a path through free cells, side by side, leads from low x to high x."""
+    label, _ = ndimage.label(free)
+    front, back = set(label[:, 0].tolist()), set(label[:, -1].tolist())
+    return bool((front & back) - {0})

@@ -1,0 +1,268 @@
+"""Height classes: nothing is lost, segments are clipped to the obstacle band and the range."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from strategies import level_view, views
+
+from groundmap import View
+from groundmap.arrays import Bools, Floats
+from groundmap.errors import NoGroundPlaneError
+from groundmap.features import Features
+from groundmap.frames import T_REP103_OPTICAL
+from groundmap.heights import FlatView, flatten
+from groundmap.settings import MapperSettings
+
+OPTIONS = MapperSettings()
+STEP, TOP, FAR = OPTIONS.step_height, OPTIONS.robot_height, OPTIONS.max_range
+
+
+def in_map(flat: FlatView, xy: Floats) -> Floats:
+    """From the frame of the view to the map."""
+    x, y = flat.forward
+    return flat.viewpoint + xy @ np.array([(x, y), (-y, x)])
+
+
+def point_classes(view: View) -> tuple[Floats, dict[str, Bools]]:
+    """Positions of points in the map, and the class of each, from the definitions."""
+    assert view.plane is not None
+    T_base = view.rig.T_base_camera
+    base = view.points.xyz @ T_base[:3, :3].T + T_base[:3, 3]
+    height = base @ view.plane.normal + view.plane.offset
+    map_ = base @ view.T_map_base[:3, :3].T + view.T_map_base[:3, 3]
+    up = T_base[:3, :3].T @ view.plane.normal
+    sigma = np.sqrt([up @ matrix @ up for matrix in view.points.covariance])
+    radius = np.hypot(*(map_ - view.T_map_camera[:3, 3])[:, :2].T)
+    tolerance = np.maximum(STEP, 2 * sigma + radius * view.plane.sigma_tilt)
+    inside = (radius >= OPTIONS.min_range) & (radius <= FAR)
+    classes = {
+        "too_near": radius < OPTIONS.min_range,
+        "out_of_range": radius > FAR,
+        "overhead": inside & (height > TOP),
+        "ground": inside & (height <= TOP) & (np.abs(height) <= tolerance),
+        "below_ground": inside & (height < -tolerance),
+        "obstacle": inside & (height <= TOP) & (height > tolerance),
+    }
+    return map_[:, :2], classes
+
+
+@settings(max_examples=100)
+@given(views())
+def test_features_are_used_or_dropped_by_a_reason(view: View) -> None:
+    flat = flatten(view, OPTIONS)
+    given_features = len(view.points) + len(view.segments) + view.dropped.total()
+    assert flat.used + flat.dropped.total() == given_features
+    assert all(count > 0 for count in flat.dropped.values())
+
+
+@settings(max_examples=100)
+@given(views())
+def test_points_are_sorted_by_height_and_range(view: View) -> None:
+    view = replace(view, segments=Features.segments([], []))
+    flat = flatten(view, OPTIONS)
+    xy, classes = point_classes(view)
+    np.testing.assert_allclose(in_map(flat, flat.points), xy[classes["obstacle"]], atol=1e-9)
+    np.testing.assert_allclose(in_map(flat, flat.supports), xy[classes["ground"]], atol=1e-9)
+    np.testing.assert_allclose(in_map(flat, flat.drop_offs), xy[classes["below_ground"]], atol=1e-9)
+    reasons = ("too_near", "out_of_range", "overhead", "below_ground")
+    expected = Counter({reason: int(classes[reason].sum()) for reason in reasons})
+    assert flat.dropped == +(view.dropped + expected)
+
+
+@settings(max_examples=50)
+@given(views())
+def test_the_covariance_is_that_of_the_place_on_the_ground(view: View) -> None:
+    flat = flatten(replace(view, segments=Features.segments([], [])), OPTIONS)
+    _, classes = point_classes(view)
+    rotation = view.T_map_camera[:2, :3]
+    turn = np.array([(flat.forward[0], flat.forward[1]), (-flat.forward[1], flat.forward[0])])
+    for found, covariance in zip(
+        flat.covariance, view.points.covariance[classes["obstacle"]], strict=True
+    ):
+        expected = turn @ rotation @ covariance @ rotation.T @ turn.T
+        np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+@settings(max_examples=60)
+@given(views())
+def test_obstacles_lie_in_the_band_and_in_range(view: View) -> None:
+    flat = flatten(view, OPTIONS)
+    assert (flat.heights >= STEP - 1e-9).all()
+    assert (flat.heights <= TOP + 1e-9).all()
+    assert (np.hypot(*flat.points.T) <= FAR + 1e-9).all()
+    assert flat.segments.shape[1] == 2
+    np.testing.assert_array_equal(
+        flat.segments.reshape(-1),
+        np.arange(len(flat.points) - flat.segments.size, len(flat.points)),
+    )
+
+
+def test_the_frame_has_its_origin_below_the_camera_and_x_ahead() -> None:
+    flat = flatten(level_view(points=[(5.0, 2.0, 1.0)], camera_height=1.3), OPTIONS)
+    np.testing.assert_allclose(flat.points, [(5.0, 2.0)])
+    np.testing.assert_allclose(flat.heights, [1.0])
+    np.testing.assert_allclose(flat.forward, (1.0, 0.0))
+    assert flat.camera_height == pytest.approx(1.3)
+
+
+@pytest.mark.parametrize(
+    ("height", "sigma", "tilt", "obstacle"),
+    [
+        (0.16, 0.0, 0.0, True),
+        (0.14, 0.0, 0.0, False),
+        (0.16, 0.1, 0.0, False),  # 2 sigma
+        (0.21, 0.1, 0.0, True),
+        (0.16, 0.0, 0.02, False),  # 10 m times the tilt
+        (0.21, 0.0, 0.02, True),
+        (0.29, 0.05, 0.02, False),  # both
+        (0.31, 0.05, 0.02, True),
+    ],
+)
+def test_the_tolerance_grows_with_what_is_not_known(
+    height: float, sigma: float, tilt: float, obstacle: bool
+) -> None:
+    view = level_view(points=[(10.0, 0.0, height)], sigma=sigma, sigma_tilt=tilt)
+    flat = flatten(view, OPTIONS)
+    assert (len(flat.points), len(flat.supports)) == ((1, 0) if obstacle else (0, 1))
+
+
+def clipped(first: tuple[float, float, float], last: tuple[float, float, float]) -> FlatView:
+    return flatten(level_view(segments=[[first, last]]), OPTIONS)
+
+
+def test_a_segment_that_rises_from_the_ground_starts_at_the_step() -> None:
+    flat = clipped((4.0, -1.0, 0.0), (4.0, 1.0, 1.0))
+    np.testing.assert_allclose(flat.heights, [STEP, 1.0])
+    np.testing.assert_allclose(flat.points, [(4.0, -1.0 + 2.0 * STEP), (4.0, 1.0)])
+    assert flat.segments.tolist() == [[0, 1]]
+    assert flat.used == 1
+
+
+def test_the_part_on_the_ground_supports_freespace() -> None:
+    flat = clipped((4.0, -1.0, 0.0), (4.0, 1.0, 1.0))
+    np.testing.assert_allclose(flat.supports[0], (4.0, -1.0))
+    np.testing.assert_allclose(flat.supports[-1], (4.0, -1.0 + 2.0 * STEP))
+    assert (np.abs(flat.support_heights) <= STEP + 1e-12).all()
+    steps = np.hypot(*np.diff(flat.supports, axis=0).T)
+    assert (steps <= OPTIONS.support_width + 1e-12).all()
+
+
+def test_a_segment_that_leaves_the_band_ends_at_the_robots_height() -> None:
+    flat = clipped((4.0, -1.0, 1.0), (4.0, 1.0, 3.0))
+    np.testing.assert_allclose(flat.heights, [1.0, TOP])
+    np.testing.assert_allclose(flat.points, [(4.0, -1.0), (4.0, 0.0)])
+
+
+def test_a_segment_through_the_whole_band_is_clipped_at_both_ends() -> None:
+    flat = clipped((4.0, 0.0, 4.0), (4.0, 5.0, -1.0))
+    np.testing.assert_allclose(flat.heights, [TOP, STEP])
+    np.testing.assert_allclose(flat.points, [(4.0, 2.0), (4.0, 4.0 - STEP)])
+
+
+@settings(max_examples=60)
+@given(st.floats(-0.5, 3.0), st.floats(-0.5, 3.0))
+def test_a_clipped_segment_stays_on_its_line_and_in_the_band(low: float, high: float) -> None:
+    flat = clipped((4.0, -2.0, low), (6.0, 2.0, high))
+    places = np.linspace(0.0, 1.0, 2001)
+    height = low + places * (high - low)
+    inside = (height > STEP) & (height <= TOP)
+    assert flat.used + flat.dropped.total() == 1
+    if inside.sum() > 1:
+        along = (flat.points[:, 0] - 4.0) / 2.0
+        np.testing.assert_allclose(np.sort(along), places[inside][[0, -1]], atol=1e-3)
+        np.testing.assert_allclose(flat.heights, low + along * (high - low), atol=1e-9)
+        np.testing.assert_allclose(flat.points[:, 1], 4.0 * along - 2.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "interval"),
+    [(0.3, 1.2, (0.3, 1.2)), (-0.5, 1.2, (STEP, 1.2)), (0.0, 5.0, (STEP, TOP))],
+)
+def test_a_vertical_segment_is_one_place_with_a_height_interval(
+    low: float, high: float, interval: tuple[float, float]
+) -> None:
+    flat = clipped((5.0, 1.0, low), (5.0, 1.0, high))
+    np.testing.assert_allclose(flat.points, [(5.0, 1.0), (5.0, 1.0)], atol=1e-12)
+    np.testing.assert_allclose(flat.heights, interval)
+    assert flat.used == 1
+
+
+def test_a_segment_without_length_is_dropped_and_counted() -> None:
+    flat = clipped((5.0, 1.0, 0.8), (5.0, 1.0, 0.8))
+    assert len(flat.points) == flat.used == 0
+    assert flat.dropped.total() == 1
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "reason"), [(2.1, 3.0, "overhead"), (-1.0, -0.3, "below_ground")]
+)
+def test_segments_outside_the_bands_are_dropped_by_reason(
+    low: float, high: float, reason: str
+) -> None:
+    flat = clipped((5.0, -1.0, low), (5.0, 1.0, high))
+    assert flat.dropped == Counter({reason: 1})
+    assert len(flat.points) == len(flat.supports) == flat.used == 0
+    assert len(flat.drop_offs) == (reason == "below_ground")
+
+
+def test_a_segment_below_the_ground_never_supports_freespace() -> None:
+    flat = clipped((4.0, 0.0, 0.0), (6.0, 0.0, -1.0))
+    np.testing.assert_allclose(flat.supports[:, 0].max(), 4.0 + 2.0 * STEP)
+
+
+def test_a_segment_that_crosses_the_range_is_clipped_to_it() -> None:
+    flat = clipped((10.0, 0.0, 0.5), (30.0, 0.0, 1.5))
+    np.testing.assert_allclose(flat.points, [(10.0, 0.0), (FAR, 0.0)], atol=1e-9)
+    np.testing.assert_allclose(flat.heights, [0.5, 1.0])
+
+
+def test_a_segment_with_both_ends_out_of_range_keeps_what_is_inside() -> None:
+    flat = clipped((12.0, -30.0, 1.0), (12.0, 30.0, 1.0))
+    half = np.sqrt(FAR**2 - 12.0**2)
+    np.testing.assert_allclose(flat.points, [(12.0, -half), (12.0, half)])
+
+
+@pytest.mark.parametrize("ends", [((21.0, -3.0), (21.0, 3.0)), ((5.0, 30.0), (8.0, 40.0))])
+def test_a_segment_out_of_range_is_dropped(
+    ends: tuple[tuple[float, float], tuple[float, float]],
+) -> None:
+    flat = clipped((*ends[0], 1.0), (*ends[1], 1.0))
+    assert flat.dropped == Counter(out_of_range=1)
+    assert len(flat.points) == 0
+
+
+def test_points_out_of_range_are_dropped_by_reason() -> None:
+    view = level_view(points=[(0.2, 0.0, 0.5), (25.0, 0.0, 0.5), (5.0, 0.0, 0.5)])
+    flat = flatten(view, OPTIONS)
+    assert flat.dropped == Counter(too_near=1, out_of_range=1)
+    assert flat.used == len(flat.points) == 1
+
+
+def test_a_view_without_a_ground_plane_is_refused() -> None:
+    view = replace(level_view(points=[(5.0, 0.0, 0.5)]), plane=None)
+    with pytest.raises(NoGroundPlaneError, match="the view has no ground plane"):
+        flatten(view, OPTIONS)
+
+
+@pytest.mark.parametrize(("degrees", "looks"), [(70.0, "ground"), (-70.0, "sky")])
+def test_a_camera_that_looks_at_the_ground_or_the_sky_is_refused(
+    degrees: float, looks: str
+) -> None:
+    turn = np.radians(degrees)
+    pitch = np.eye(4)
+    pitch[1:3, 1:3] = [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
+    view = replace(level_view(points=[(5.0, 0.0, 0.5)]), T_map_base=T_REP103_OPTICAL @ pitch)
+    with pytest.raises(NoGroundPlaneError, match=f"the camera looks at the {looks}"):
+        flatten(view, OPTIONS)
+
+
+def test_a_view_without_features_is_empty() -> None:
+    flat = flatten(level_view(), OPTIONS)
+    assert [len(part) for part in (flat.points, flat.supports, flat.drop_offs)] == [0, 0, 0]
+    assert flat.used == flat.dropped.total() == 0

@@ -1,0 +1,121 @@
+"""Uncertainty models: how far a feature spreads, in which direction, and how surely."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from strategies import rngs
+
+from groundmap.arrays import Floats
+from groundmap.uncertainty import MODELS, Ellipsoid, Exact, Radius
+
+DIRECTIONS = np.linspace(0.0, np.pi, 20001)
+
+
+def covariances(rng: np.random.Generator, count: int) -> Floats:
+    factors = rng.normal(scale=0.5, size=(count, 2, 2))
+    return factors @ np.swapaxes(factors, 1, 2)
+
+
+def deviation(covariance: Floats, bearings: Floats) -> Floats:
+    """Standard deviation of one covariance in each direction."""
+    rays = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
+    variance: Floats = ((rays @ covariance) * rays).sum(axis=1)
+    return np.sqrt(np.maximum(variance, 0.0))
+
+
+def edges(rng: np.random.Generator, count: int) -> Floats:
+    return rng.uniform((3.0, -5.0), (12.0, 5.0), size=(count, 2, 2))
+
+
+def test_models_go_by_their_names() -> None:
+    assert set(MODELS) == {"ellipsoid", "radius", "none"}
+    assert all(model.name == name for name, model in MODELS.items())
+
+
+@settings(max_examples=50)
+@given(rngs())
+def test_the_ellipsoid_reaches_along_the_line_of_sight(rng: np.random.Generator) -> None:
+    xy, covariance = rng.uniform(-9.0, 9.0, size=(5, 2)), covariances(rng, 5)
+    expected = [
+        deviation(matrix, np.array([np.arctan2(y, x)]))[0]
+        for (x, y), matrix in zip(xy, covariance, strict=True)
+    ]
+    np.testing.assert_allclose(Ellipsoid().sigma(xy, covariance), expected)
+
+
+@settings(max_examples=50)
+@given(rngs())
+def test_the_radius_is_the_deviation_in_the_worst_direction(rng: np.random.Generator) -> None:
+    xy, covariance = rng.uniform(-9.0, 9.0, size=(5, 2)), covariances(rng, 5)
+    expected = [deviation(matrix, DIRECTIONS).max() for matrix in covariance]
+    np.testing.assert_allclose(Radius().sigma(xy, covariance), expected, rtol=1e-6)
+
+
+@settings(max_examples=20)
+@given(rngs())
+def test_without_a_model_of_uncertainty_nothing_spreads(rng: np.random.Generator) -> None:
+    ends = edges(rng, 4)
+    reach = np.zeros((4, 2))
+    assert not Exact().sigma(ends[:, 0], covariances(rng, 4)).any()
+    np.testing.assert_array_equal(Exact().outline(ends, reach), ends[:, [0, 1, 1, 0]])
+    assert all((part == 1.0).all() for part in Exact().evidence(reach, 0.1))
+
+
+@settings(max_examples=50)
+@given(rngs())
+def test_the_ellipsoids_outline_is_what_the_reach_sweeps_along_the_rays(
+    rng: np.random.Generator,
+) -> None:
+    ends, reach = edges(rng, 4), rng.uniform(0.1, 2.0, size=(4, 2))
+    radius = np.hypot(ends[..., 0], ends[..., 1])
+    for outline, pair, far, long in zip(
+        Ellipsoid().outline(ends, reach), ends, radius, reach, strict=True
+    ):
+        near, beyond = pair * (1 - long / far)[:, None], pair * (1 + long / far)[:, None]
+        expected = shapely.MultiPoint([*near, *beyond])
+        assert shapely.hausdorff_distance(shapely.MultiPoint(outline), expected) < 1e-9
+        assert shapely.Polygon(outline).is_valid
+
+
+@settings(max_examples=25)
+@given(rngs())
+def test_the_radius_outline_and_caps_lie_within_the_radius(rng: np.random.Generator) -> None:
+    ends, radius = edges(rng, 4), rng.uniform(0.1, 2.0, size=4)
+    reach = np.stack([radius, radius], axis=1)
+    model = Radius()
+    caps = model.caps(reach)
+    for outline, pair, cap, width in zip(
+        model.outline(ends, reach), ends, caps, radius, strict=True
+    ):
+        spread = shapely.union_all(
+            [
+                shapely.Polygon(outline),
+                *shapely.buffer(shapely.points(pair), cap, quad_segs=100),
+            ]
+        )
+        expected = shapely.LineString(pair).buffer(width, quad_segs=100)
+        assert shapely.symmetric_difference(spread, expected).area < 2e-3
+
+
+@pytest.mark.parametrize("resolution", [0.05, 0.1524, 1.0])
+@pytest.mark.parametrize("reach", [0.0, 0.01, 0.3, 2.0])
+def test_a_ray_through_the_spread_adds_up_to_one_cell_at_most(
+    resolution: float, reach: float
+) -> None:
+    both = np.full((1, 2), reach)
+    expected = 1.0 if reach == 0 else min(1.0, resolution / (2.0 * reach))
+    for model in (Ellipsoid(), Radius()):
+        on_surface, around = model.evidence(both, resolution)
+        assert around.item() == pytest.approx(expected)
+        assert on_surface.item() == (1.0 if model.name == "ellipsoid" else around.item())
+        assert around.item() * max(2.0 * reach, resolution) == pytest.approx(resolution)
+
+
+@pytest.mark.parametrize("model", ["ellipsoid", "radius"])
+def test_only_a_radius_has_caps(model: str) -> None:
+    reach = np.array([[0.2, 0.5]])
+    expected = reach if model == "radius" else np.zeros((1, 2))
+    np.testing.assert_array_equal(MODELS[model].caps(reach), expected)
