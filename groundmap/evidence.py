@@ -55,11 +55,11 @@ def evidence_of(
     model = MODELS[settings.uncertainty]
     to_cells = _CellsOf(flat, grid)
     origin = to_cells(np.zeros((1, 2)))[0]
-    free, ends = to_cells(fan.free), to_cells(surfaces.ends)
+    free, ends, cores = map(to_cells, (fan.free, surfaces.ends, surfaces.cores))
     outlines = to_cells(model.outline(surfaces.cores, surfaces.reach))
     caps = model.caps(surfaces.reach) / grid.resolution
     discs = surfaces.discs / grid.resolution
-    corners = [free, outlines, ends, *_around(ends, caps), *_around(ends, discs[:, None])]
+    corners = [free, outlines, ends, *_around(cores, caps), *_around(ends, discs[:, None])]
     drawn = np.concatenate([origin[None], *(array.reshape(-1, 2) for array in corners)])
     lower = np.floor(drawn.min(axis=0)) - MARGIN
     shape = (np.floor(drawn.max(axis=0)) - lower).astype(np.int64) + 1 + MARGIN
@@ -76,7 +76,7 @@ def evidence_of(
         odd = np.zeros(z.shape, dtype=np.uint8)
         free = free - lower
         fill_star(z, odd, origin - lower, free[:, 0], free[:, 1], fan.joined)
-    draw_surfaces(z, ends - lower, outlines - lower, caps, discs, on_surface, around)
+    draw_surfaces(z, ends - lower, cores - lower, outlines - lower, caps, discs, on_surface, around)
     return Evidence(lower[::-1].astype(np.int64), z)
 
 

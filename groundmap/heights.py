@@ -89,7 +89,9 @@ def flatten(view: View, settings: MapperSettings) -> FlatView:
     forward = T_map_camera[:2, 2] / np.hypot(T_map_camera[0, 2], T_map_camera[1, 2])
     dropped = Counter(view.dropped)
     points = _measure(view.points, view, plane, forward, settings)
-    segments = _measure(view.segments, view, plane, forward, settings)
+    lasting = (view.segments.xyz[:, 0] != view.segments.xyz[:, 1]).any(axis=1)
+    dropped["zero_length"] += int((~lasting).sum())
+    segments = _measure(view.segments.select(lasting), view, plane, forward, settings)
     segments.feature[...] += len(view.points)
     parts = [
         _point_classes(points, settings, dropped),
@@ -210,8 +212,8 @@ def _sampled(segments: _Heights, spans: Floats, settings: MapperSettings) -> _He
     step = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     fraction = step / np.maximum(counts[rows] - 1, 1)
     t = spans[rows, 0] + fraction * (spans[rows, 1] - spans[rows, 0])
-    samples = _pick(segments, rows).at(t[:, None])
-    return _Heights(*(field[:, 0] for field in samples))
+    samples = _Heights(*(field[:, 0] for field in _pick(segments, rows).at(t[:, None])))
+    return _pick(samples, samples.radius >= settings.min_range)
 
 
 def _pick(heights: _Heights, rows: Bools | Ints) -> _Heights:

@@ -29,7 +29,7 @@ class Surfaces(NamedTuple):
     """Surfaces of one view, each a straight piece; shape (s, ...)."""
 
     ends: Floats  #: shape (s, 2, 2) [m, view], counter-clockwise around the viewpoint
-    cores: Floats  #: shape (s, 2, 2) [m, view], what spreads: the same, of lone points a cell
+    cores: Floats  #: shape (s, 2, 2) [m, view], what spreads: the same, or a lone point's core
     reach: Floats  #: shape (s, 2) [m], how far freespace ends before it
     tops: Floats  #: shape (s, 2) [m] above the ground
     kind: Bytes  #: shape (s,), `SurfaceKind`
@@ -80,14 +80,15 @@ def find_surfaces(flat: FlatView, mesh: Mesh, settings: MapperSettings) -> Surfa
         vertices.xy, mesh.edges[believed], mesh.constrained[believed], settings.min_range
     )
     ends = pieces.at(vertices)
-    discs = _discs(vertices, mesh.edges[believed], ends)
-    away = np.hypot(discs.xy[:, 0], discs.xy[:, 1]) >= settings.min_range
-    blocked += int((~away).sum())
-    discs = _Vertices(*(values[away] for values in discs))
+    lone = np.ones(len(vertices.xy), dtype=np.bool_)
+    lone[mesh.edges[believed]] = False
+    near = np.hypot(vertices.xy[:, 0], vertices.xy[:, 1]) < settings.min_range
+    blocked += int((lone & near).sum())
+    discs = _discs(vertices, lone & ~near, ends)
     radius = np.maximum(0.5 * settings.resolution, discs.sigma)
     everything = np.concatenate([ends.xy, _silhouettes(discs.xy, radius)])
-    half_cell = np.full(len(radius), 0.5 * settings.resolution)
-    cores = np.concatenate([ends.xy, _silhouettes(discs.xy, half_cell)])
+    core = np.full(len(radius), MODELS[settings.uncertainty].core_radius(settings.resolution))
+    cores = np.concatenate([ends.xy, _silhouettes(discs.xy, core)])
     reach = settings.spread_sigmas * np.concatenate([ends.sigma, _twice(discs.sigma)])
     tops = np.concatenate([ends.high, _twice(discs.high)])
     kind = np.concatenate(
@@ -173,13 +174,11 @@ def _away_from_viewpoint(
     return _Pieces(edges[number], span), constrained[number], blocked
 
 
-def _discs(vertices: _Vertices, edges: Ints, ends: _Vertices) -> _Vertices:
+def _discs(vertices: _Vertices, lone: Bools, ends: _Vertices) -> _Vertices:
     """Return the lone vertices, and the nearer ends of edges that are seen end-on.
 
     Seen end-on, an edge covers no bearing, so it counts by its nearer end.
     """
-    lone = np.ones(len(vertices.xy), dtype=np.bool_)
-    lone[edges] = False
     first, last = ends.xy[:, 0], ends.xy[:, 1]
     angle = np.arctan2(np.abs(_cross(first, last)), (first * last).sum(axis=1))
     radial = np.flatnonzero(angle < RADIAL)

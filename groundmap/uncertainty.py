@@ -30,6 +30,10 @@ class Ellipsoid:
         sigma: Floats = np.sqrt(np.einsum("ni,nij,nj->n", ray, covariance, ray))
         return sigma
 
+    def core_radius(self, resolution: float) -> float:
+        """Return the half-width of what a lone point spreads from: its own cell [m]."""
+        return 0.5 * resolution
+
     def outline(self, ends: Floats, reach: Floats) -> Floats:
         """Return the quadrangle that a surface spreads over, shape (s, 4, 2) [m, view].
 
@@ -58,6 +62,10 @@ class Radius(Ellipsoid):
         """Return the standard deviation in each feature's least certain direction [m]."""
         sigma: Floats = np.sqrt(np.linalg.eigvalsh(covariance)[:, -1])
         return sigma
+
+    def core_radius(self, resolution: float) -> float:
+        """Return 0 [m]: the caps alone spread a lone point to all sides alike."""
+        return 0.0
 
     def outline(self, ends: Floats, reach: Floats) -> Floats:
         """Return the quadrangle across the surface, shape (s, 4, 2) [m, view]."""

@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from groundmap.arrays import Bools, Floats, Ints
 from groundmap.evidence import Evidence
+from groundmap.heights import FlatView
 from groundmap.sight2d import SightFan
 from groundmap.triangulation import Mesh
 
@@ -133,7 +134,8 @@ def support_chords(supports: Floats, width: float, angle: float) -> Floats:
     half = np.minimum(width / radius, angle)
     bearing = np.arctan2(supports[:, 1], supports[:, 0])
     both = bearing[:, None] + np.stack([-half, half], axis=1)
-    return radius[:, None, None] * np.stack([np.cos(both), np.sin(both)], axis=-1)
+    chords: Floats = radius[:, None, None] * np.stack([np.cos(both), np.sin(both)], axis=-1)
+    return chords
 
 
 def triangles_of(fan: SightFan) -> list[shapely.Polygon]:
@@ -203,6 +205,13 @@ def cells_in_disc(centre: Floats, radius: float, shape: tuple[int, int]) -> Bool
 
 
 # Evidence
+
+
+def in_map(flat: FlatView, xy: Floats) -> Floats:
+    """From the frame of the view to the map."""
+    x, y = flat.forward
+    places: Floats = flat.viewpoint + xy @ np.array([(x, y), (-y, x)])
+    return places
 
 
 def said(evidence: Evidence) -> dict[Cell, float]:

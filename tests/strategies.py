@@ -158,6 +158,9 @@ def flat_view(
     spread = np.asarray(covariance, dtype=np.float64)
     if spread.ndim < 2:
         spread = spread[..., None, None] * np.eye(2)
+    feature = np.arange(len(xy) + len(ground))
+    for a, b in np.asarray(segments, dtype=np.int64).reshape(-1, 2).tolist():
+        feature[b] = feature[a]  # both ends are of one feature
     return FlatView(
         viewpoint=np.array(viewpoint),
         forward=np.array(forward),
@@ -170,6 +173,7 @@ def flat_view(
         support_heights=np.broadcast_to(
             np.asarray(support_heights, dtype=np.float64), len(ground)
         ).copy(),
+        feature=feature,
         drop_offs=np.empty((0, 2)),
         used=len(xy) + len(ground),
         dropped=Counter(),

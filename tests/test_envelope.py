@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from oracles import inverse_ranges
-from strategies import rngs
 
 from groundmap.arrays import Floats, Ints
 from groundmap.kernels.envelope import fill_gaps, upper_envelope
+from oracles import inverse_ranges
+from strategies import rngs
 
 DENSE = np.linspace(-np.pi, np.pi, 4001)[1:-1] + 1e-5
 
@@ -21,7 +21,8 @@ def random_edges(rng: np.random.Generator, count: int) -> Floats:
     bearing.sort(axis=1)
     radius = rng.uniform(0.5, 9.0, size=bearing.shape)
     ends = radius[..., None] * np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
-    return ends[bearing[:, 1] - bearing[:, 0] < 3.0][:count]
+    narrow: Floats = ends[bearing[:, 1] - bearing[:, 0] < 3.0][:count]
+    return narrow
 
 
 def by_bearing(ends: Floats) -> tuple[Floats, Floats, Floats, Floats]:

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import level_view, views
 
 from groundmap import View
 from groundmap.arrays import Bools, Floats
@@ -18,15 +17,11 @@ from groundmap.features import Features
 from groundmap.frames import T_REP103_OPTICAL
 from groundmap.heights import FlatView, flatten
 from groundmap.settings import MapperSettings
+from oracles import in_map
+from strategies import level_view, views
 
 OPTIONS = MapperSettings()
 STEP, TOP, FAR = OPTIONS.step_height, OPTIONS.robot_height, OPTIONS.max_range
-
-
-def in_map(flat: FlatView, xy: Floats) -> Floats:
-    """From the frame of the view to the map."""
-    x, y = flat.forward
-    return flat.viewpoint + xy @ np.array([(x, y), (-y, x)])
 
 
 def point_classes(view: View) -> tuple[Floats, dict[str, Bools]]:
@@ -209,6 +204,18 @@ def test_segments_outside_the_bands_are_dropped_by_reason(
     assert flat.dropped == Counter({reason: 1})
     assert len(flat.points) == len(flat.supports) == flat.used == 0
     assert len(flat.drop_offs) == (reason == "below_ground")
+
+
+def test_pieces_carry_the_number_of_their_feature() -> None:
+    rising = [(4.0, -1.0, 0.0), (4.0, 1.0, 1.0)]
+    wall = [(8.0, -1.0, 0.5), (8.0, 1.0, 0.5)]
+    places = [(5.0, 0.0, 3.0), (6.0, 0.0, 0.0), (7.0, 0.0, 1.0)]
+    flat = flatten(level_view(points=places, segments=[rising, wall]), OPTIONS)
+    count = len(flat.points)
+    assert flat.feature[:count].tolist() == [2, 3, 3, 4, 4]
+    assert flat.feature[count] == 1
+    assert set(flat.feature[count + 1 :].tolist()) == {3}
+    assert len(flat.feature) == count + len(flat.supports)
 
 
 def test_a_segment_below_the_ground_never_supports_freespace() -> None:

@@ -7,6 +7,9 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from groundmap.arrays import Bools, Floats
+from groundmap.kernels.raster import draw_surfaces, fill_star
 from oracles import (
     cells_crossed,
     cells_in_disc,
@@ -15,9 +18,6 @@ from oracles import (
     parity_inside,
 )
 from strategies import rngs
-
-from groundmap.arrays import Bools, Floats
-from groundmap.kernels.raster import draw_surfaces, fill_star
 
 SHAPE = (24, 32)
 
@@ -31,7 +31,8 @@ def pieces(origin: Floats, start: Floats, end: Floats, joined: Bools) -> Bools:
     z = np.zeros(SHAPE, dtype=np.float32)
     fill_star(z, np.zeros(SHAPE, dtype=np.uint8), origin, start, end, joined)
     assert set(np.unique(z)) <= {0.0, -1.0}
-    return z != 0
+    found: Bools = z != 0
+    return found
 
 
 def drawn(
@@ -49,13 +50,15 @@ def drawn(
     draw_surfaces(
         z,
         ends[None],
+        ends[None],
         corners[None],
         np.array([caps]),
         np.array([disc]),
         np.array([on_surface]),
         np.array([around]),
     )
-    return z > 0
+    found: Bools = z > 0
+    return found
 
 
 def random_star(rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:
@@ -184,7 +187,9 @@ def test_a_line_visits_the_cells_it_passes_through(rng: np.random.Generator) -> 
     ends = rng.uniform((-4.0, -4.0), (36.0, 28.0), size=(2, 2))
     if rng.uniform() < 0.3:
         ends[1] = ends[0] + rng.uniform(-0.5, 0.5, size=2)
-    np.testing.assert_array_equal(drawn(ends, on_surface=1.0), cells_crossed(*ends, SHAPE))
+    np.testing.assert_array_equal(
+        drawn(ends, on_surface=1.0), cells_crossed(ends[0], ends[1], SHAPE)
+    )
 
 
 @settings(max_examples=100)
@@ -192,7 +197,7 @@ def test_a_line_visits_the_cells_it_passes_through(rng: np.random.Generator) -> 
 def test_a_line_between_cell_corners_and_centres_leaves_no_cell_out(data: st.DataObject) -> None:
     ends = np.array([[data.draw(dyadic(0, 31)), data.draw(dyadic(0, 23))] for _ in range(2)])
     found = drawn(ends, on_surface=1.0)
-    crossed = cells_crossed(*ends, SHAPE)
+    crossed = cells_crossed(ends[0], ends[1], SHAPE)
     x, y = np.moveaxis(centres(SHAPE), -1, 0)
     # Along a border either side may be meant; elsewhere every cell crossed is visited.
     if (ends[0] != ends[1]).all():
@@ -292,8 +297,8 @@ def test_the_surer_surface_wins_in_any_order(rng: np.random.Generator) -> None:
 
     def drawing(order: list[int]) -> Floats:
         z = np.full(SHAPE, -1.0, dtype=np.float32)
-        picked = (ends[order], outlines[order], flat[0], flat[1], on_surface[order], around[order])
-        draw_surfaces(z, *picked)
+        picked = (outlines[order], flat[0], flat[1], on_surface[order], around[order])
+        draw_surfaces(z, ends[order], ends[order], *picked)
         return z.astype(np.float64)
 
     forth = drawing(list(range(count)))

@@ -7,6 +7,13 @@ import pytest
 import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+
+from groundmap.arrays import Floats
+from groundmap.heights import FlatView
+from groundmap.settings import MapperSettings
+from groundmap.sight2d import NO_SURFACE, SightFan, seen_through, visible_freespace
+from groundmap.surfaces import Surfaces, find_surfaces
+from groundmap.triangulation import triangulate
 from oracles import (
     inverse_ranges,
     support_chords,
@@ -15,13 +22,6 @@ from oracles import (
     visible_region,
 )
 from strategies import Cloud, flat_view, rngs, rooms
-
-from groundmap.arrays import Floats
-from groundmap.heights import FlatView
-from groundmap.settings import MapperSettings
-from groundmap.sight2d import NO_SURFACE, SightFan, seen_through, visible_freespace
-from groundmap.surfaces import Surfaces, find_surfaces
-from groundmap.triangulation import triangulate
 
 EXACT = MapperSettings(uncertainty="none")
 UNLINKED = MapperSettings(uncertainty="none", link_length=0.0, link_angle=0.0)
@@ -42,7 +42,8 @@ def region(flat: FlatView, surfaces: Surfaces, options: MapperSettings = EXACT) 
 def ground(rng: np.random.Generator) -> Floats:
     """Ground features on all sides."""
     supports = rng.uniform(-12.0, 12.0, size=(rng.integers(0, 20), 2))
-    return supports[np.hypot(*supports.T) > 0.3]
+    beyond: Floats = supports[np.hypot(*supports.T) > 0.3]
+    return beyond
 
 
 @settings(max_examples=150)
@@ -270,6 +271,13 @@ def test_a_wall_seen_through_a_ghost_is_counted_once_per_feature() -> None:
     assert count_seen_through([1.8, 1.8, 1.8, 1.8], [(8.0, 0.0)], [1.4]) == 1
     through = [(8.0, -0.5), (8.0, 0.0), (8.0, 0.5)]
     assert count_seen_through([1.8, 1.8, 1.8, 1.8], through, [1.4, 1.4, 1.4]) == 3
+
+
+def test_a_segment_seen_through_a_ghost_is_one_feature() -> None:
+    flat = flat_view(
+        [*AHEAD, (7.0, -0.5), (7.0, 0.5)], [*TWO_WALLS, (4, 5)], heights=[1.8] * 4 + [1.2] * 2
+    )
+    assert seen_through(flat, *seen(flat)) == 1
 
 
 @pytest.mark.parametrize(("height", "count"), [(0.99, 1), (1.01, 0)])

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
-from strategies import Cloud, flat_view, level_view, rngs, rooms
 
 from groundmap.arrays import Floats
 from groundmap.heights import FlatView, flatten
 from groundmap.settings import MapperSettings
 from groundmap.surfaces import SurfaceKind, Surfaces, find_surfaces
 from groundmap.triangulation import triangulate
+from strategies import Cloud, flat_view, level_view, rngs, rooms
 
 OPTIONS = MapperSettings(uncertainty="ellipsoid")
 
@@ -25,7 +27,8 @@ def surfaces_of(flat: FlatView, options: MapperSettings = OPTIONS) -> Surfaces:
 
 def of_kind(surfaces: Surfaces, kind: SurfaceKind) -> Floats:
     """Ends of the surfaces of that kind, shape (n, 2, 2)."""
-    return surfaces.ends[surfaces.kind == kind]
+    ends: Floats = surfaces.ends[surfaces.kind == kind]
+    return ends
 
 
 def pairs(ends: Floats) -> set[frozenset[tuple[float, float]]]:
@@ -48,7 +51,9 @@ def test_edges_are_links_by_length_range_and_height_and_frontiers_else(
     height = rng.uniform(0.2, 1.5, size=len(points))
     range_ = np.hypot(*points.T)
     corners = Delaunay(points).simplices[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    links, frontiers, joined = set(), set(), set()
+    links: set[frozenset[int]] = set()
+    frontiers: set[frozenset[int]] = set()
+    joined: set[int] = set()
     for a, b in {(min(pair), max(pair)) for pair in corners.tolist()}:
         length = np.hypot(*(points[a] - points[b]))
         near_enough = length <= longest_link(min(range_[a], range_[b]), options)
@@ -164,7 +169,9 @@ def test_a_post_within_the_near_range_is_no_surface() -> None:
 
 @pytest.mark.parametrize("model", ["none", "ellipsoid", "radius"])
 @pytest.mark.parametrize("sigma", [0.0, 0.05, 0.4])
-def test_a_lone_point_is_a_disc_of_half_a_cell_or_its_sigma(model: str, sigma: float) -> None:
+def test_a_lone_point_is_a_disc_of_half_a_cell_or_its_sigma(
+    model: Literal["none", "ellipsoid", "radius"], sigma: float
+) -> None:
     options = MapperSettings(uncertainty=model)
     surfaces = surfaces_of(flat_view([(6, 3)], covariance=sigma**2, heights=0.7), options)
     radius = max(options.resolution / 2.0, 0.0 if model == "none" else sigma)

@@ -6,6 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from scipy.spatial import Delaunay, KDTree
+
+from groundmap.arrays import Floats
+from groundmap.errors import InputError
+from groundmap.triangulation import MERGE_DISTANCE, NODING_GRID, Mesh, triangulate
 from oracles import (
     components,
     deepest_intrusion,
@@ -15,12 +20,7 @@ from oracles import (
     without_chain,
     without_segment,
 )
-from scipy.spatial import Delaunay, KDTree
 from strategies import Cloud, clouds, rngs
-
-from groundmap.arrays import Floats
-from groundmap.errors import InputError
-from groundmap.triangulation import MERGE_DISTANCE, NODING_GRID, Mesh, triangulate
 
 SCALES = [1e-2, 1.0, 1e2, 1e4]
 KINDS = ["generic", "lattice", "tenths", "thirds", "near_duplicates", "collinear", "t_junctions"]

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
-from strategies import rngs
 
 from groundmap.arrays import Floats
 from groundmap.uncertainty import MODELS, Ellipsoid, Exact, Radius
+from strategies import rngs
 
 DIRECTIONS = np.linspace(0.0, np.pi, 20001)
 

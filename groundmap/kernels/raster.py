@@ -65,6 +65,7 @@ def _first_centre(coordinate):  # type: ignore[no-untyped-def]
 def draw_surfaces(
     z: Floats32,
     ends: Floats,
+    cores: Floats,
     outlines: Floats,
     caps: Floats,
     discs: Floats,
@@ -82,7 +83,7 @@ def draw_surfaces(
         _draw_line(z, outlines[i, 1], outlines[i, 2], spread)
         for side in range(2):
             if caps[i, side] > 0.0:
-                _fill_disc(z, ends[i, side], caps[i, side], spread)
+                _fill_disc(z, cores[i, side], caps[i, side], spread)
         surface = np.float32(on_surface[i])
         if discs[i] > 0.0:
             middle = 0.5 * (ends[i, 0] + ends[i, 1])
