@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -55,13 +55,6 @@ def check_finite(name: str, values: Floats, *, hint: str = "") -> None:
         index = tuple(int(i) for i in np.argwhere(wrong)[0])
         where = f"index {index if len(index) != 1 else index[0]}" if index else ""
         raise InputError(name, "finite numbers", str(values[index]), where=where, hint=hint)
-
-
-def frozen(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Return a read-only view of `array`: what is handed out is not written to."""
-    view = array.view()
-    view.flags.writeable = False
-    return view
 
 
 def _shown(shape: tuple[int | None, ...]) -> str:

@@ -23,7 +23,7 @@ class Triangulated(NamedTuple):
     dropped: Counter[str]  #: how many rows were dropped, by reason
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class StereoRig:
     """A rectified stereo pair.
 
@@ -124,8 +124,9 @@ class StereoRig:
                 "no_disparity": int((finite & ~visible).sum()),
             }
         )
-        xyz = self._points(rows[kept], disparity_px[kept])
-        covariance = self._covariance(xyz, disparity_px[kept])
+        with np.errstate(over="ignore", invalid="ignore"):  # a view drops what is not finite
+            xyz = self._points(rows[kept], disparity_px[kept])
+            covariance = self._covariance(xyz, disparity_px[kept])
         shape = (len(xyz), 2) if ends else (len(xyz),)
         return Triangulated(
             xyz.reshape(*shape, 3), covariance.reshape(*shape, 3, 3), kept, +dropped

@@ -17,9 +17,29 @@ what was expected, what came instead, where it was first seen, and what to do.
 from __future__ import annotations
 
 from os import PathLike
+from typing import Any
 
 
-class GroundmapError(Exception):
+class Factual(Exception):
+    """An exception that composes its message from facts, and survives pickling with them.
+
+    Both packages' trees grow from it. Python would call the class again with the finished message;
+    a worker process that raises one would then die of a TypeError instead.
+    """
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Carry message and facts over as they are."""
+        return _again, (type(self), self.args, self.__dict__)
+
+
+def _again(kind: type[Factual], args: tuple[Any, ...], facts: dict[str, Any]) -> Factual:
+    error = kind.__new__(kind, *args)
+    error.args = args
+    error.__dict__.update(facts)
+    return error
+
+
+class GroundmapError(Factual):
     """Base of every exception of this package."""
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from groundmap.ground import GroundPlane
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Features:
     """Point or segment features of one view, in the camera frame.
 
@@ -84,7 +84,7 @@ class Features:
         return Features(self.xyz[keep], self.covariance[keep], self.ids[keep])
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class View:
     """One stereo observation.
 

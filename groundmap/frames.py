@@ -7,13 +7,13 @@ optical frame is x right, y down, z forward.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from groundmap.arrays import Floats, as_floats, check_finite
-from groundmap.errors import CameraError
+from groundmap.errors import CameraError, InputError
 
 World = Literal["optical", "rep103"]
 
@@ -34,7 +34,7 @@ def check_transform(name: str, matrix: npt.ArrayLike) -> Floats:
     InputError
         Another shape, or NaN or infinite entries.
     """
-    transform = as_floats(name, matrix, (4, 4))
+    transform = as_floats(name, matrix, (4, 4)).copy()  # what is checked is not changed later
     check_finite(name, transform)
     rotation = transform[:3, :3]
     deviation = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
@@ -49,6 +49,7 @@ def check_transform(name: str, matrix: npt.ArrayLike) -> Floats:
         raise CameraError(name, "a rotation", "a reflection (determinant -1)")
     if not np.allclose(transform[3], (0.0, 0.0, 0.0, 1.0)):
         raise CameraError(name, "a last row of 0 0 0 1", str(transform[3]))
+    transform.flags.writeable = False
     return transform
 
 
@@ -64,6 +65,11 @@ def invert(transform: Floats) -> Floats:
 def map_from_world(T_world: Floats, world: World) -> Floats:
     """Turn a pose given in the data's world into the ``map`` frame.
 
+    Raises
+    ------
+    InputError
+        Another world than "optical" or "rep103".
+
     Examples
     --------
     >>> pose = np.eye(4)
@@ -71,6 +77,8 @@ def map_from_world(T_world: Floats, world: World) -> Floats:
     >>> map_from_world(pose, "optical")[:3, 3]
     array([ 3., -1., -2.])
     """
+    if world not in get_args(World):
+        raise InputError("world", "'optical' or 'rep103'", repr(world))
     return T_REP103_OPTICAL @ T_world if world == "optical" else T_world
 
 

@@ -17,6 +17,7 @@ from groundmap.tiles import LAYERS, TILE_SHAPES, Index, Tile, Tiles
 from groundmap.window import CellState, GridWindow, cells_of
 
 FORMAT, VERSION = "groundmap-grid", 1
+MOST_CELLS = 2**30  # of a dense window: 12 GiB
 
 
 class ConfidenceGrid:
@@ -133,12 +134,21 @@ class ConfidenceGrid:
         Raises
         ------
         InputError
-            Bounds that are not finite, or whose upper corner is not above the lower.
+            Bounds that are not finite, whose upper corner is not above the lower, or that hold
+            more than 2**30 cells.
         """
         if bounds is None:
             lower, upper = self.cell_bounds()
         else:
             lower, upper = self._cells_of_box(bounds)
+        if np.prod((upper - lower).astype(np.float64)) > MOST_CELLS:
+            size = " x ".join(str(length) for length in (upper - lower).tolist())
+            raise InputError(
+                "bounds",
+                f"a box of {MOST_CELLS} cells at most",
+                size,
+                hint="Ask for a smaller box.",
+            )
         dense = self._tiles.read(lower, upper)
         return GridWindow(
             dense.confidence,
@@ -177,7 +187,14 @@ class ConfidenceGrid:
             Cell of the block's first entry, ``[row, col]``.
         z : ndarray of float32
             Evidence per cell in [-1, 1]; 0 says nothing and changes nothing.
+
+        Raises
+        ------
+        InputError
+            Evidence that is NaN or beyond [-1, 1].
         """
+        if not (np.abs(z) <= 1.0).all():
+            raise InputError("z", "evidence in [-1, 1]", "NaN or numbers beyond")
         for tile, block in self._tiles.cut(lower, z):
             self.rule.update(tile.confidence, tile.count, block)
 

@@ -16,7 +16,7 @@ MOST_LEAN = np.radians(45.0)  # between "up" of the base and z of the map
 TILT_FLOOR = 0.005  # [rad], a real road is no plane: more features don't make it one
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class GroundPlane:
     """The ground under one view, in its ``base_link`` frame, so that it moves with the pose.
 

@@ -36,7 +36,7 @@ def fit_ground(
     camera_height: float | None = None,
     **settings: Any,
 ) -> Iterator[View]:
-    """Yield the views, each with the ground plane under it.
+    """Return the views, each with the ground plane under it, as they are asked for.
 
     A plane is fitted to the features of a window of views around each view (behind it, with
     ``causal=True``), since planes of single views swing by degrees. Views are read as they are
@@ -52,9 +52,9 @@ def fit_ground(
     **settings
         `groundmap.settings.GroundSettings`: ``window`` [views], ``causal``, ``max_range`` [m], ...
 
-    Yields
-    ------
-    View
+    Returns
+    -------
+    iterator of View
 
     Raises
     ------
@@ -68,8 +68,11 @@ def fit_ground(
     if plane is not None and camera_height is not None:
         raise InputError("fit_ground", "plane or camera_height", "both")
     if plane is not None or camera_height is not None:
-        yield from _with_given_plane(views, plane, camera_height)
-        return
+        return _with_given_plane(views, plane, camera_height)
+    return _with_fitted_plane(views, options)
+
+
+def _with_fitted_plane(views: Iterable[View], options: GroundSettings) -> Iterator[View]:
     last: GroundPlane | None = None
     for view, window in _windows(views, options):
         last = _fit(view, window, options) or last

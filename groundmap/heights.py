@@ -8,7 +8,8 @@ not depend on where in the map the view stands; only the last step turns and shi
 from __future__ import annotations
 
 from collections import Counter
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from groundmap.errors import NoGroundPlaneError
 from groundmap.features import Features, View
 from groundmap.ground import GroundPlane, check_camera
 from groundmap.settings import MapperSettings
+from groundmap.spans import inside_circle, where_positive
 
 
 class FlatView(NamedTuple):
@@ -174,32 +176,24 @@ def _segment_classes(
     segments: _Heights, settings: MapperSettings, dropped: Counter[str]
 ) -> _Classes:
     """Cut every segment into its obstacle piece and its ground piece, each possibly empty."""
-    start, stop = _within_range(segments, settings.max_range)
-    reached = start < stop
-    first, last = segments.height[:, 0], segments.height[:, 1]
+    reached = inside_circle(segments.xy[:, 0], segments.xy[:, 1], settings.max_range)
     over_step = segments.height - segments.tolerance
-    # Linear along the segment: above the step, below the robot's top, and within the step of 0.
-    above = _positive(over_step[:, 0], over_step[:, 1])
-    under_top = _positive(settings.robot_height - first, settings.robot_height - last)
     over_hole = segments.height + segments.tolerance
-    over = _positive(over_hole[:, 0], over_hole[:, 1])
-    within = _positive(-over_step[:, 0], -over_step[:, 1])
-    obstacle = _intersect((start, stop), above, under_top)
-    ground = _intersect((start, stop), over, within)
-    has_obstacle = reached & (obstacle[0] <= obstacle[1])
-    has_ground = reached & (ground[0] <= ground[1])
-    is_below = reached & (np.minimum(over_hole[:, 0], over_hole[:, 1]) < 0) & ~has_ground
-    is_below &= ~has_obstacle
-    dropped["out_of_range"] += int((~reached).sum())
-    dropped["below_ground"] += int(is_below.sum())
-    dropped["overhead"] += int((reached & ~has_obstacle & ~has_ground & ~is_below).sum())
-    pieces = _pick(segments, has_obstacle).at(np.stack(obstacle, axis=1)[has_obstacle])
-    middles = segments.xy[is_below].mean(axis=1)
+    below_top = settings.robot_height - segments.height
+    # All of these are linear along the segment.
+    obstacle = reached.cut(where_positive(*over_step.T)).cut(where_positive(*below_top.T))
+    ground = reached.cut(where_positive(*over_hole.T)).cut(where_positive(*-over_step.T))
+    used = obstacle.any | ground.any
+    below = reached.any & ~used & (over_hole.min(axis=1) < 0)
+    dropped["out_of_range"] += int((~reached.any).sum())
+    dropped["below_ground"] += int(below.sum())
+    dropped["overhead"] += int((reached.any & ~used & ~below).sum())
+    pieces = _pick(segments, obstacle.any).at(np.stack(obstacle, axis=1)[obstacle.any])
     return _Classes(
-        _Heights(*(field.reshape(-1, *field.shape[2:]) for field in pieces)),
-        _sampled(_pick(segments, has_ground), np.stack(ground, axis=1)[has_ground], settings),
-        middles,
-        int((has_obstacle | has_ground).sum()),
+        _each(pieces, lambda field: field.reshape(-1, *field.shape[2:])),
+        _sampled(_pick(segments, ground.any), np.stack(ground, axis=1)[ground.any], settings),
+        segments.xy[below].mean(axis=1),
+        int(used.sum()),
     )
 
 
@@ -212,42 +206,13 @@ def _sampled(segments: _Heights, spans: Floats, settings: MapperSettings) -> _He
     step = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     fraction = step / np.maximum(counts[rows] - 1, 1)
     t = spans[rows, 0] + fraction * (spans[rows, 1] - spans[rows, 0])
-    samples = _Heights(*(field[:, 0] for field in _pick(segments, rows).at(t[:, None])))
+    samples = _each(_pick(segments, rows).at(t[:, None]), lambda field: field[:, 0])
     return _pick(samples, samples.radius >= settings.min_range)
 
 
 def _pick(heights: _Heights, rows: Bools | Ints) -> _Heights:
-    return _Heights(*(field[rows] for field in heights))
+    return _each(heights, lambda field: field[rows])
 
 
-def _positive(at_start: Floats, at_end: Floats) -> tuple[Floats, Floats]:
-    """Return the part [t0, t1] of 0..1 where a linear function is not negative; empty: t0 > t1."""
-    slope = at_end - at_start
-    with np.errstate(divide="ignore", invalid="ignore"):
-        root = -at_start / slope
-    start = np.where(at_start >= 0, 0.0, np.where(slope > 0, root, 2.0))
-    stop = np.where(at_end >= 0, 1.0, np.where(slope < 0, root, -1.0))
-    return start, stop
-
-
-def _intersect(*spans: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
-    return (
-        np.maximum.reduce([span[0] for span in spans]),
-        np.minimum.reduce([span[1] for span in spans]),
-    )
-
-
-def _within_range(segments: _Heights, max_range: float) -> tuple[Floats, Floats]:
-    """Return the part [t0, t1] of 0..1 inside the circle of `max_range` around the camera."""
-    start = segments.xy[:, 0]
-    along = segments.xy[:, 1] - start
-    a = (along**2).sum(axis=1)
-    b = (start * along).sum(axis=1)
-    c = (start**2).sum(axis=1) - max_range**2
-    root = np.sqrt(np.maximum(b * b - a * c, 0.0))
-    flat = a == 0.0  # vertical segments: inside or not as a whole
-    scale = np.where(flat, 1.0, a)
-    t0 = np.where(flat, np.where(c <= 0, 0.0, 2.0), (-b - root) / scale)
-    t1 = np.where(flat, np.where(c <= 0, 1.0, -1.0), (-b + root) / scale)
-    missed = (b * b - a * c < 0) & ~flat
-    return np.maximum(t0, np.where(missed, 2.0, 0.0)), np.minimum(t1, np.where(missed, -1.0, 1.0))
+def _each(heights: _Heights, change: Callable[[Any], Any]) -> _Heights:
+    return _Heights(*map(change, heights))

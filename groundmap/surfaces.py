@@ -10,6 +10,7 @@ import numpy as np
 from groundmap.arrays import Bools, Bytes, Floats, Ints
 from groundmap.heights import FlatView
 from groundmap.settings import MapperSettings
+from groundmap.spans import inside_circle
 from groundmap.triangulation import Mesh
 from groundmap.uncertainty import MODELS
 
@@ -154,23 +155,14 @@ def _away_from_viewpoint(
     xy: Floats, edges: Ints, constrained: Bools, min_range: float
 ) -> tuple[_Pieces, Bools, int]:
     """Clip edges to the outside of the circle of `min_range`; count those that lie inside."""
-    start, along = xy[edges[:, 0]], xy[edges[:, 1]] - xy[edges[:, 0]]
-    a, b = (along**2).sum(axis=1), (start * along).sum(axis=1)
-    c = (start**2).sum(axis=1) - min_range**2
-    root = np.sqrt(np.maximum(b * b - a * c, 0.0))
-    enters, leaves = np.clip((-b - root) / a, 0.0, 1.0), np.clip((-b + root) / a, 0.0, 1.0)
-    missed = (b * b - a * c <= 0) | (enters >= leaves)
-    rows = np.arange(len(edges))
-    before, after = ~missed & (enters > 0), ~missed & (leaves < 1)
-    number = np.concatenate([rows[missed], rows[before], rows[after]])
-    span = np.concatenate(
-        [
-            np.tile([0.0, 1.0], (int(missed.sum()), 1)),
-            np.stack([np.zeros(before.sum()), enters[before]], axis=1),
-            np.stack([leaves[after], np.ones(after.sum())], axis=1),
-        ]
-    )
-    blocked = int((~missed & ~before & ~after).sum())
+    inside = inside_circle(xy[edges[:, 0]], xy[edges[:, 1]], min_range)
+    whole = inside.start >= inside.stop  # a circle that is only touched cuts nothing off
+    before, after = ~whole & (inside.start > 0), ~whole & (inside.stop < 1)
+    zero, one = np.zeros(len(edges)), np.ones(len(edges))
+    spans = ((whole, zero, one), (before, zero, inside.start), (after, inside.stop, one))
+    number = np.concatenate([np.flatnonzero(rows) for rows, _, _ in spans])
+    span = np.concatenate([np.stack([t0, t1], axis=1)[rows] for rows, t0, t1 in spans])
+    blocked = int((~whole & ~before & ~after).sum())
     return _Pieces(edges[number], span), constrained[number], blocked
 
 

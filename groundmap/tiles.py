@@ -15,7 +15,7 @@ LAYERS = {"confidence": np.float32, "count": np.uint32, "drop_offs": np.uint32}
 Index = tuple[int, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Tile:
     """One tile's arrays, each of the tile shape; the fields are `LAYERS`."""
 

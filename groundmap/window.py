@@ -23,7 +23,7 @@ class CellState(IntEnum):
     CONTESTED = 3  #: in between: the views contradict each other
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GridWindow:
     """A dense piece of a grid; arrays are indexed ``[row, col]`` (``[layer, row, col]`` in 3-D).
 

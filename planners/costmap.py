@@ -17,7 +17,7 @@ from planners.problem import PlanningProblem
 SLACK = 5e-10  # [m] shortfall of clearance that is put down to the rounding of coordinates
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Costmap:
     """Which cells are blocked, how far away they are, and which moves that allows.
 

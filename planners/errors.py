@@ -20,11 +20,13 @@ from __future__ import annotations
 
 from typing import Literal, TypeAlias
 
+from groundmap.errors import Factual
+
 Place: TypeAlias = Literal["start", "goal"]
 Point: TypeAlias = tuple[float, float]  #: x, y [m, map]
 
 
-class PlanningError(Exception):
+class PlanningError(Factual):
     """Base of every exception of this package."""
 
 

@@ -17,7 +17,7 @@ from planners.costmap import Costmap
 from planners.polyline import Crossed, crossed
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Route:
     """A route that a planner found and the audit passed.
 

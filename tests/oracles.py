@@ -115,8 +115,11 @@ def inverse_ranges(ends: Floats, bearings: Floats) -> Floats:
 def visible_region(surfaces: Floats, chords: Floats) -> shapely.Geometry:
     """Return what a viewpoint at the origin sees: surfaces hide what is behind them.
 
-    Where there is no surface at a bearing, the chords bound the region.
+    Where there is no surface at a bearing, the chords bound the region. Edges seen end-on have no
+    area to hide behind, and no valid polygon.
     """
+    sine = _cross(surfaces[:, 0], surfaces[:, 1]) / np.prod(np.hypot(*surfaces.T), axis=0)
+    surfaces = surfaces[sine > 1e-9]
     seen = shapely.union_all(_wedges(surfaces))
     shadows = shapely.polygons(
         np.stack([surfaces[:, 0], FAR * surfaces[:, 0], FAR * surfaces[:, 1], surfaces[:, 1]], 1)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from groundmap.arrays import Floats, as_floats, check_finite, frozen
+from groundmap.arrays import Floats, as_floats, check_finite
 from groundmap.errors import InputError
 
 finite = st.floats(-1e9, 1e9)
@@ -70,12 +70,3 @@ def test_the_first_value_that_is_not_finite_is_named(
 def test_the_place_in_a_vector_is_a_plain_number() -> None:
     with pytest.raises(InputError, match=r"v: expected finite numbers, got nan at index 1\.$"):
         check_finite("v", np.array([0.0, np.nan]))
-
-
-def test_what_is_handed_out_is_not_written_to_but_follows_its_owner() -> None:
-    own = np.zeros(3)
-    shown = frozen(own)
-    with pytest.raises(ValueError, match="read-only"):
-        shown[0] = 1.0
-    own[0] = 2.0
-    assert shown[0] == 2.0

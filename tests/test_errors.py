@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -56,3 +58,18 @@ def test_a_file_error_names_file_and_line() -> None:
     assert (error.path, error.line) == ("a/b.csv", 3)
     assert str(error) == "a/b.csv: expected 7 columns, got 6 at line 3."
     assert str(FileFormatError("b.csv", "a table", "none")) == "b.csv: expected a table, got none."
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        InputError("baseline", "a number above 0 [m]", "0.0", hint="Give the rig's."),
+        FileFormatError("poses.txt", "8 columns", "7", line=12),
+        NoGroundPlaneError("the camera looks at the sky"),
+    ],
+)
+def test_an_error_survives_its_way_out_of_a_worker_process(error: GroundmapError) -> None:
+    again = pickle.loads(pickle.dumps(error))
+    assert type(again) is type(error)
+    assert str(again) == str(error)
+    assert again.__dict__ == error.__dict__

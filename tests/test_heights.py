@@ -127,6 +127,12 @@ def test_the_tolerance_grows_with_what_is_not_known(
     assert (len(flat.points), len(flat.supports)) == ((1, 0) if obstacle else (0, 1))
 
 
+def test_what_is_over_the_robot_is_overhead_however_uncertain() -> None:
+    flat = flatten(level_view(points=[(10.0, 0.0, TOP + 0.1)], sigma=1.5), OPTIONS)
+    assert flat.dropped == Counter(overhead=1)
+    assert flat.used == len(flat.points) == len(flat.supports) == 0
+
+
 def clipped(first: tuple[float, float, float], last: tuple[float, float, float]) -> FlatView:
     return flatten(level_view(segments=[[first, last]]), OPTIONS)
 

@@ -88,10 +88,10 @@ def test_settings_hold_what_they_were_given(resolution: float, cap: int) -> None
 def test_settings_are_frozen() -> None:
     settings = MapperSettings()
     with pytest.raises(ValidationError, match="frozen"):
-        settings.resolution = 1.0  # type: ignore[misc]
+        settings.resolution = 1.0  # type: ignore[misc]  # mypy sees it, too
     assert settings.resolution == 0.1524
 
 
 def test_settings_are_given_by_name() -> None:
     with pytest.raises(TypeError, match="positional"):
-        MapperSettings(0.1)  # type: ignore[call-arg, misc]
+        MapperSettings(0.1)  # type: ignore[call-arg]  # mypy sees it, too

@@ -98,6 +98,12 @@ def test_a_link_is_believed_up_to_its_bound(
     assert len(surfaces.frontiers) == (0 if linked else 1)
 
 
+@pytest.mark.parametrize(("depth", "linked"), [(0.69, True), (0.71, False)])
+def test_the_nearer_end_sets_the_bound(depth: float, linked: bool) -> None:
+    surfaces = surfaces_of(flat_view([(17.5, 0), (17.5 + depth, 0.02)]))
+    assert (SurfaceKind.LINK in surfaces.kind) == linked
+
+
 @pytest.mark.parametrize(
     ("band", "height", "linked"),
     [((0.2, 1.8), 1.0, True), ((0.2, 0.6), 1.05, True), ((0.2, 0.6), 1.15, False)],
