@@ -20,7 +20,7 @@ from os import PathLike
 from typing import Any
 
 
-class Factual(Exception):
+class FactualError(Exception):
     """An exception that composes its message from facts, and survives pickling with them.
 
     Both packages' trees grow from it. Python would call the class again with the finished message;
@@ -32,14 +32,14 @@ class Factual(Exception):
         return _again, (type(self), self.args, self.__dict__)
 
 
-def _again(kind: type[Factual], args: tuple[Any, ...], facts: dict[str, Any]) -> Factual:
+def _again(kind: type[FactualError], args: tuple[Any, ...], facts: dict[str, Any]) -> FactualError:
     error = kind.__new__(kind, *args)
     error.args = args
     error.__dict__.update(facts)
     return error
 
 
-class GroundmapError(Factual):
+class GroundmapError(FactualError):
     """Base of every exception of this package."""
 
 

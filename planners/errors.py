@@ -20,13 +20,13 @@ from __future__ import annotations
 
 from typing import Literal, TypeAlias
 
-from groundmap.errors import Factual
+from groundmap.errors import FactualError
 
 Place: TypeAlias = Literal["start", "goal"]
 Point: TypeAlias = tuple[float, float]  #: x, y [m, map]
 
 
-class PlanningError(Factual):
+class PlanningError(FactualError):
     """Base of every exception of this package."""
 
 
