@@ -155,6 +155,13 @@ def test_the_spread_lies_along_the_rays(view: View) -> None:
     assert (shapely.distance(boxes(sure), anything) < SLACK).all()
 
 
+def test_the_spread_does_not_reach_behind_the_viewpoint() -> None:
+    """A short baseline knows of a wall 18 m ahead within 10 m: twice that is beyond the camera."""
+    flat = flat_view([(18, -1), (18, 1)], [(0, 1)], covariance=10.0**2)
+    nonfree = [cell for cell, value in said(by_hand(flat).evidence).items() if value > 0]
+    assert min(col for _, col in nonfree) >= -1
+
+
 @settings(max_examples=40)
 @given(views())
 def test_what_a_segment_sweeps_along_the_rays_is_nonfree(view: View) -> None:

@@ -217,6 +217,12 @@ def test_a_crossing_is_as_high_as_the_segments_there_for_links_too() -> None:
         assert (frozenset([(4.7, 0.0), (5.0, 0.0)]) in links) == linked
 
 
+def test_a_low_point_on_a_high_segment_does_not_lower_it() -> None:
+    """The segment is two edges there, and the vertex between them is of both features."""
+    flat = flat_view([(5, -2), (5, 2), (5, 0)], [(0, 1)], heights=[1.8, 1.8, 0.3])
+    np.testing.assert_array_equal(surfaces_of(flat).tops, np.full((2, 2), 1.8))
+
+
 def test_features_that_share_a_vertex_span_a_band_and_take_the_widest_covariance() -> None:
     flat = flat_view(
         [(5, 0), (5.0004, 0), (5, 1)], [(0, 2)], heights=[0.3, 1.7, 0.3], covariance=[0.01, 0.25, 0]
