@@ -27,7 +27,7 @@ class Mesh(NamedTuple):
     constrained: Bools  #: shape (e,), edges that are pieces of segments
     source: Ints  #: shape (n,), vertex of each input point
     crossings: (
-        Ints  #: shape (c, 3), (vertex, a, b): a crossing lies on the segment of vertices a, b
+        Ints  #: shape (c, 3), (vertex, a, b): the vertex lies inside the segment of vertices a, b
     )
 
 
@@ -136,7 +136,7 @@ def _insert(vertices: Floats, constraints: Ints, source: Ints) -> Mesh:
     fixed = np.array([(e.v1, e.v2) for e in library.fixed_edges_iter()], dtype=np.int64)
     fixed = np.sort(fixed.reshape(-1, 2), axis=1)
     edges, constrained = _edges(points, simplices, across, fixed)
-    crossings = _crossings(library, len(vertices)) if len(points) > len(vertices) else []
+    crossings = _crossings(library) if library.piece_to_originals_count() else []
     return Mesh(
         points,
         simplices,
@@ -173,15 +173,15 @@ def _along_line(points: Floats) -> Ints:
     return np.sort(np.stack([order[:-1], order[1:]], axis=1), axis=1)
 
 
-def _crossings(library: cdt.Triangulation, n_inputs: int) -> list[tuple[int, int, int]]:
-    """Return (vertex, a, b) for vertices that the library put where segments cross."""
+def _crossings(library: cdt.Triangulation) -> list[tuple[int, int, int]]:
+    """Return (vertex, a, b) for vertices inside segments: where these cross, and points on them."""
     return sorted(
         {
             (vertex, original.v1, original.v2)
             for piece, originals in library.piece_to_originals_iter()
             for vertex in (piece.v1, piece.v2)
-            if vertex >= n_inputs
             for original in originals
+            if vertex not in (original.v1, original.v2)
         }
     )
 
@@ -202,11 +202,10 @@ def _noded(vertices: Floats, constraints: Ints, source: Ints) -> Mesh:
     ends = vertex[len(lattice) :]
     edges = np.sort(np.stack([ends[:-1], ends[1:]], axis=1)[part[:-1] == part[1:]], axis=1)
     mesh = _insert(everything[first[order]], np.unique(edges, axis=0), vertex[source])
-    n_inputs = int(vertex[: len(lattice)].max()) + 1
-    crossings = _segments_through(mesh.points[n_inputs:], lattice, constraints)
-    crossings[:, 0] += n_inputs
-    crossings[:, 1:] = vertex[crossings[:, 1:]]
-    crossings = crossings[crossings[:, 1] != crossings[:, 2]]  # ends that fell on one node
+    on, a, b = _segments_through(mesh.points, lattice, constraints).T
+    a, b = vertex[a], vertex[b]
+    inside = (on != a) & (on != b) & (a != b)  # ends may have fallen on one node
+    crossings = np.stack([on, a, b], axis=1)[inside]
     return mesh._replace(points=mesh.points * NODING_GRID, crossings=crossings)
 
 

@@ -42,7 +42,11 @@ class Ellipsoid:
         ends : ndarray, shape (s, 2, 2) [m, view]
         reach : ndarray, shape (s, 2) [m]
         """
-        return _quadrangle(ends, _unit(ends) * reach[..., None])
+        radius = np.hypot(ends[..., 0], ends[..., 1])
+        ray = _unit(ends)
+        # However unsure, a feature is in front of the viewpoint, not behind it.
+        near = ends - ray * np.minimum(reach, radius)[..., None]
+        return _quadrangle(near, ends + ray * reach[..., None])
 
     def caps(self, reach: Floats) -> Floats:
         """Return the radius of the disc at each end, shape (s, 2) [m]; 0 for none."""
@@ -71,7 +75,8 @@ class Radius(Ellipsoid):
         """Return the quadrangle across the surface, shape (s, 4, 2) [m, view]."""
         along = _unit(ends[:, 1] - ends[:, 0])
         across = np.stack([-along[:, 1], along[:, 0]], axis=1)
-        return _quadrangle(ends, across[:, None, :] * reach[..., None])
+        offset = across[:, None, :] * reach[..., None]
+        return _quadrangle(ends - offset, ends + offset)
 
     def caps(self, reach: Floats) -> Floats:
         """Return the radius of the disc at each end, shape (s, 2) [m]."""
@@ -102,8 +107,7 @@ def _constant_density(reach: Floats, resolution: float) -> Floats:
     return density
 
 
-def _quadrangle(ends: Floats, offset: Floats) -> Floats:
-    near, far = ends - offset, ends + offset
+def _quadrangle(near: Floats, far: Floats) -> Floats:
     return np.stack([near[:, 0], near[:, 1], far[:, 1], far[:, 0]], axis=1)
 
 

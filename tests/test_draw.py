@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -62,7 +63,7 @@ def test_each_cell_has_the_shade_of_its_state() -> None:
     for cell, state in enumerate(order):
         shade = SHADES[state][1] if state != CellState.CONTESTED else SHADES[state][0]
         np.testing.assert_allclose(shown[cell], shade)
-    assert image.get_extent() == [0.0, 4.0, 0.0, 1.0]
+    assert tuple(image.get_extent()) == (0.0, 4.0, 0.0, 1.0)
 
 
 def test_row_0_is_at_the_bottom() -> None:
@@ -79,7 +80,7 @@ def test_row_0_is_at_the_bottom() -> None:
 
 
 def rendered(figure: Figure) -> tuple[np.ndarray, int]:
-    canvas = FigureCanvasAgg(figure)
+    canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     pixels = np.asarray(canvas.buffer_rgba())[..., :3]
     return pixels, pixels.shape[0]
