@@ -72,7 +72,8 @@ def find_surfaces(flat: FlatView, mesh: Mesh, settings: MapperSettings) -> Surfa
 
     Segments are. Links between neighbouring features are, up to a length of
     min(max(link_length, link_angle r), 0.8 narrowest_footprint), r the range of the nearer end, if
-    the features' height bands overlap. A vertex with neither is a disc of max(cell / 2, sigma).
+    the features' height bands overlap. A vertex with neither is a disc of max(cell / 2, sigma), but
+    not larger than such a link is long.
     All other edges are frontiers: they bound nothing and grant nothing.
     """
     vertices = _vertices(flat, mesh, settings)
@@ -86,7 +87,9 @@ def find_surfaces(flat: FlatView, mesh: Mesh, settings: MapperSettings) -> Surfa
     near = np.hypot(vertices.xy[:, 0], vertices.xy[:, 1]) < settings.min_range
     blocked += int((lone & near).sum())
     discs = _discs(vertices, lone & ~near, ends)
-    radius = np.maximum(0.5 * settings.resolution, discs.sigma)
+    # However unsure a point is, its disc hides no more than a link to a neighbour would.
+    bound = _longest_link(np.hypot(discs.xy[:, 0], discs.xy[:, 1]), settings)
+    radius = np.maximum(0.5 * settings.resolution, np.minimum(discs.sigma, bound))
     everything = np.concatenate([ends.xy, _silhouettes(discs.xy, radius)])
     core = np.full(len(radius), MODELS[settings.uncertainty].core_radius(settings.resolution))
     cores = np.concatenate([ends.xy, _silhouettes(discs.xy, core)])
@@ -139,16 +142,21 @@ def _vertices(flat: FlatView, mesh: Mesh, settings: MapperSettings) -> _Vertices
 def _believed(vertices: _Vertices, edges: Ints, settings: MapperSettings) -> Bools:
     a, b = edges[:, 0], edges[:, 1]
     length = np.hypot(*(vertices.xy[b] - vertices.xy[a]).T)
-    nearer = np.hypot(*vertices.xy.T)[edges].min(axis=1)
-    longest = np.minimum(
-        np.maximum(settings.link_length, settings.link_angle * nearer),
-        SHARE_OF_FOOTPRINT * settings.narrowest_footprint,
-    )
+    longest = _longest_link(np.hypot(*vertices.xy.T)[edges].min(axis=1), settings)
     apart = np.maximum(vertices.low[a], vertices.low[b]) - np.minimum(
         vertices.high[a], vertices.high[b]
     )
     believed: Bools = (length <= longest) & (apart <= settings.link_height)
     return believed
+
+
+def _longest_link(radius: Floats, settings: MapperSettings) -> Floats:
+    """Return how long a link may be to be believed [m], at a distance from the viewpoint [m]."""
+    longest: Floats = np.minimum(
+        np.maximum(settings.link_length, settings.link_angle * radius),
+        SHARE_OF_FOOTPRINT * settings.narrowest_footprint,
+    )
+    return longest
 
 
 def _away_from_viewpoint(
