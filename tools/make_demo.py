@@ -33,7 +33,7 @@ PER_SIDE, PER_GROUND = 6.0, 6.0  # [1/m²], landmarks
 LINES_PER_SIDE = 0.4  # [1/m²], segments of each direction, besides the edges of boxes
 LONGEST = 1.2  # [m], of a segment
 OUTSIDE = 0.01  # [m], landmarks stand off their box, so that it does not hide them
-EVERY = 1.2, np.radians(30.0)  # [m], [rad]: the robot takes a view at least this often
+EVERY = 1.5, np.radians(36.0)  # [m], [rad]: the robot takes a view at least this often
 
 
 class Box(NamedTuple):
@@ -66,18 +66,20 @@ PARKED = (
 )
 POLES = tuple(
     Box(x - 0.06, y - 0.06, x + 0.06, y + 0.06, 2.2)
-    for x, y in ((7.0, 9.3), (11.8, 3.2), (3.6, 6.6), (20.8, 6.4), (17.0, 13.2))
+    for x, y in ((7.0, 9.3), (12.2, 1.8), (3.6, 6.6), (20.8, 6.4), (17.0, 13.2))
 )
 BOXES = WALLS + PARKED + POLES
 # Where the robot went, x, y [m] and yaw [deg]; it turns on the spot where only the yaw changes.
 DRIVE = np.array(
     [
-        (3.0, 3.4, 180), (3.0, 3.4, 270), (3.0, 3.4, 360), (6.0, 2.6, 345), (9.0, 2.6, 330),
-        (11.0, 3.2, 375), (12.4, 5.4, 440), (12.4, 7.6, 480), (10.6, 9.2, 610), (8.0, 9.6, 530),
-        (6.0, 8.2, 590), (6.0, 8.2, 510), (6.4, 11.6, 450), (6.4, 11.6, 490), (6.4, 11.6, 360),
-        (9.4, 10.6, 385), (11.0, 9.8, 360), (14.0, 9.7, 355), (15.6, 9.7, 290), (15.6, 11.4, 430),
-        (16.8, 11.8, 380), (19.6, 11.8, 350), (22.0, 11.0, 450), (22.6, 9.6, 270),
-        (22.2, 7.0, 240), (21.4, 4.6, 180), (20.2, 3.4, 270), (20.2, 3.4, 120),
+        (3.0, 3.4, 180), (3.0, 3.4, 270), (3.0, 3.4, 0), (6.0, 2.6, -15), (9.4, 2.8, -20),
+        (11.4, 3.6, -10), (11.8, 5.4, 45), (12.0, 7.4, 110), (11.6, 8.2, 235), (8.0, 8.2, 190),
+        (5.4, 8.0, 180), (2.2, 8.2, 190), (2.2, 8.2, 285), (2.2, 8.2, 180), (2.0, 9.6, 100),
+        (2.0, 11.8, 80), (3.8, 12.6, 45), (5.8, 12.2, 40), (5.8, 12.2, -60), (6.8, 11.2, -10),
+        (9.4, 10.8, 10), (12.2, 10.6, 70), (12.6, 9.7, 0), (15.4, 9.7, -10), (15.6, 9.2, -75),
+        (15.4, 6.8, -75), (17.6, 6.8, 0), (20.0, 7.4, -20), (22.4, 6.0, -80), (21.6, 3.4, -110),
+        (20.0, 2.6, 180), (20.0, 2.6, 90), (20.4, 4.8, 70), (22.4, 7.6, 80), (22.4, 10.6, 110),
+        (22.4, 11.2, 180), (19.4, 11.6, 190), (16.2, 11.8, 150), (15.8, 12.0, 60),
     ]
 )  # fmt: skip
 
@@ -106,7 +108,7 @@ def rig() -> StereoRig:
 
 def drive() -> Floats:
     """Return the poses of ``base_link`` along the drive, shape (n, 4, 4) [map]."""
-    stops = DRIVE * (1.0, 1.0, np.pi / 180.0)
+    stops = np.column_stack([DRIVE[:, :2], np.unwrap(np.radians(DRIVE[:, 2]))])
     moves = np.diff(stops, axis=0)
     lengths = np.hypot(moves[:, 0], moves[:, 1]) / EVERY[0]
     counts = np.ceil(np.maximum(lengths, np.abs(moves[:, 2]) / EVERY[1])).astype(int)

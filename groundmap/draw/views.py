@@ -42,9 +42,9 @@ def draw_view(parts: ViewParts, grid: ConfidenceGrid, *, title: str = "") -> Fig
     axes = figure.subplots(2, 2)
     figure.suptitle(title)
     for ax, draw in zip(
-        axes.ravel()[:3], (_draw_features, _draw_triangulation, _draw_fan), strict=True
+        axes.ravel()[:3], (draw_features, draw_triangulation, draw_fan), strict=True
     ):
-        draw(parts, ax)
+        draw(parts, ax=ax)
         ax.plot(0.0, 0.0, "^", color="0.1", markersize=8)
         ax.set_xlabel("x [m, view]")
         ax.set_ylabel("y [m, view]")
@@ -54,7 +54,7 @@ def draw_view(parts: ViewParts, grid: ConfidenceGrid, *, title: str = "") -> Fig
         ax.set_xlim(low[0], high[0])
         ax.set_ylim(low[1], high[1])
         ax.set_aspect("equal")
-    _draw_evidence(parts, grid, axes[1, 1])
+    draw_evidence(parts, grid, ax=axes[1, 1])
     return figure
 
 
@@ -64,7 +64,8 @@ def _reach(parts: ViewParts) -> tuple[Floats, Floats]:
     return places.min(axis=0) - 1.0, places.max(axis=0) + 1.0
 
 
-def _draw_features(parts: ViewParts, ax: Axes) -> None:
+def draw_features(parts: ViewParts, *, ax: Axes) -> None:
+    """Draw obstacle features by height, ground features, and what lies below the ground."""
     flat = parts.flat
     points = ax.scatter(
         flat.points[:, 0],
@@ -86,7 +87,8 @@ def _draw_features(parts: ViewParts, ax: Axes) -> None:
     )
 
 
-def _draw_triangulation(parts: ViewParts, ax: Axes) -> None:
+def draw_triangulation(parts: ViewParts, *, ax: Axes) -> None:
+    """Draw which edges of the triangulation are surfaces, and which are frontiers."""
     from matplotlib.collections import LineCollection
 
     frontiers = LineCollection(
@@ -94,11 +96,12 @@ def _draw_triangulation(parts: ViewParts, ax: Axes) -> None:
     )
     frontiers.set_label("frontiers: too long to believe")
     ax.add_collection(frontiers)
-    _draw_surfaces(parts, ax)
+    draw_surfaces(parts, ax=ax)
     ax.set_title("constrained Delaunay triangulation", fontsize=10)
 
 
-def _draw_surfaces(parts: ViewParts, ax: Axes) -> None:
+def draw_surfaces(parts: ViewParts, *, ax: Axes) -> None:
+    """Draw segments, links and lone points."""
     from matplotlib.collections import LineCollection
 
     for kind, (color, width, label) in SURFACES.items():
@@ -109,7 +112,8 @@ def _draw_surfaces(parts: ViewParts, ax: Axes) -> None:
             ax.add_collection(lines)
 
 
-def _draw_fan(parts: ViewParts, ax: Axes) -> None:
+def draw_fan(parts: ViewParts, *, ax: Axes) -> None:
+    """Draw the triangles of visible freespace, by what ends them, and the surfaces."""
     from matplotlib.collections import LineCollection, PolyCollection
 
     fan = parts.fan
@@ -126,11 +130,12 @@ def _draw_fan(parts: ViewParts, ax: Axes) -> None:
     ends = LineCollection(list(fan.ends), colors=SEEN_END, linewidths=0.8)
     ends.set_label("where sight ends")
     ax.add_collection(ends)
-    _draw_surfaces(parts, ax)
+    draw_surfaces(parts, ax=ax)
     ax.set_title(f"sight fan: {len(fan.free)} triangles, {fan.area:.0f} m²", fontsize=10)
 
 
-def _draw_evidence(parts: ViewParts, grid: ConfidenceGrid, ax: Axes) -> None:
+def draw_evidence(parts: ViewParts, grid: ConfidenceGrid, *, ax: Axes) -> None:
+    """Draw z of every cell that the view speaks of."""
     lower, z = parts.evidence
     x, y = grid.origin + lower[::-1] * grid.resolution
     rows, cols = z.shape

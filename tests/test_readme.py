@@ -1,0 +1,56 @@
+"""The README's examples run, and print what it says they print."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from groundmap import fit_ground, read_views
+from planners.cli import app
+
+README = Path(__file__).parents[1] / "README.md"
+pytestmark = pytest.mark.skipif(not README.is_file(), reason="README.md is not beside the tests")
+
+
+def blocks(language: str = "") -> list[str]:
+    text = README.read_text(encoding="utf-8")
+    return [
+        body
+        for name, body in re.findall(r"```(\w*)\n(.*?)```", text, re.DOTALL)
+        if name == language
+    ]
+
+
+def test_the_first_example_prints_its_answer() -> None:
+    (code,) = blocks("python")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == blocks()[1]
+
+
+def test_the_first_example_has_ten_lines_at_most() -> None:
+    (code,) = blocks("python")
+    assert len([line for line in code.splitlines() if line.strip()]) <= 10
+
+
+def test_the_log_that_is_shown_can_be_read(tmp_path: Path) -> None:
+    (rig,) = blocks("toml")
+    poses, points = (block for block in blocks() if block.startswith(("# poses.txt", "view,id")))
+    (tmp_path / "rig.toml").write_text(rig)
+    (tmp_path / "poses.txt").write_text(poses)
+    (tmp_path / "points.csv").write_text(points)
+    views = list(read_views(tmp_path))
+    assert [len(view.points) for view in views] == [2, 1]
+    np.testing.assert_allclose(views[1].T_map_camera[:3, 3], (0.2, 0.0, 0.0), atol=1e-12)
+    assert [view.plane is not None for view in fit_ground(views, camera_height=1.0)] == [True] * 2
+
+
+def test_every_command_is_in_the_table() -> None:
+    listed = set(
+        re.findall(r"^\| `groundmap (\w+)", README.read_text(encoding="utf-8"), re.MULTILINE)
+    )
+    assert listed == {command.name for command in app.registered_commands}

@@ -1,0 +1,69 @@
+"""Draw the picture of README.md, docs/pipeline.png: from features to a route, in four steps.
+
+`python tools/make_picture.py` maps the log that `groundmap demo` maps.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from groundmap import GroundMapper, fit_ground, read_views
+from groundmap.draw import draw_grid, draw_route, draw_trajectory, save_figure
+from groundmap.draw.views import draw_fan, draw_features, draw_triangulation
+from planners import PlanningProblem, plan
+from planners.commands.demo import FOOTPRINT, GOAL
+
+ROOT = Path(__file__).parent.parent
+VIEW = 47  # it sees far
+VIEW_BOUNDS = (-0.5, -7.0, 13.5, 7.0)  # [m, view]
+MAP_BOUNDS = (-1.0, -1.0, 25.0, 17.0)  # [m, map]
+
+
+def main() -> None:
+    """Map, plan, draw, save."""
+    views = list(fit_ground(read_views(ROOT / "planners" / "demo_data")))
+    mapper = GroundMapper()
+    parts = mapper.explain(views[VIEW])
+    for view in views:
+        mapper.integrate(view)
+    start = mapper.grid.trajectory[0, :2]
+    route = plan(PlanningProblem(mapper.grid, start=start, goal=GOAL, footprint=FOOTPRINT))
+    figure = Figure(figsize=(15.0, 3.7), layout="constrained")
+    axes = figure.subplots(1, 4, width_ratios=(1.0, 1.0, 1.45, 1.45))
+    draw_features(parts, ax=axes[0])
+    figure.axes[-1].remove()  # the scale of the heights
+    draw_fan(parts, ax=axes[1])
+    draw_triangulation(parts, ax=axes[1])
+    for ax in axes[2:]:
+        draw_grid(mapper.grid, bounds=MAP_BOUNDS, ax=ax)
+        ax.get_legend().remove()
+    draw_trajectory(mapper.grid.trajectory, ax=axes[2])
+    axes[2].get_legend().remove()
+    draw_route(route.waypoints, footprint=FOOTPRINT, ax=axes[3])
+    axes[3].get_legend().remove()
+    titles = (
+        "1  features of one view, by height",
+        "2  its surfaces and sight fan",
+        f"3  {len(views)} views fused: confidence",
+        f"4  a route of {route.length:.1f} m, audited",
+    )
+    for ax, title in zip(axes, titles, strict=True):
+        frame(ax, title)
+    for ax in axes[:2]:
+        ax.set(xlim=VIEW_BOUNDS[::2], ylim=VIEW_BOUNDS[1::2])
+        ax.plot(0.0, 0.0, "^", color="0.1", markersize=7)
+    save_figure(figure, ROOT / "docs" / "pipeline.png", dpi=100)
+
+
+def frame(ax: Axes, title: str) -> None:
+    """Give a panel its title and take the rest away."""
+    ax.set_title("")
+    ax.set_title(title, fontsize=11, loc="left")
+    ax.set(xticks=[], yticks=[], xlabel="", ylabel="", aspect="equal")
+
+
+if __name__ == "__main__":
+    main()
