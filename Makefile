@@ -7,7 +7,7 @@ BIN := .venv/bin
 READY := .venv/.ready
 WHEEL_VENV := .wheel-venv
 
-.PHONY: help setup test check size wheel-test clean
+.PHONY: help setup demo test check size wheel-test clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "%-12s %s\n", $$1, $$2}' Makefile
@@ -19,6 +19,9 @@ $(READY): pyproject.toml
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --editable '.[dev]'
 	@touch $@
+
+demo: $(READY) ## Map a recorded courtyard and plan through it; writes groundmap-demo/
+	$(BIN)/groundmap demo
 
 test: $(READY) ## Run the tests and the doctests
 	$(BIN)/pytest -n $(WORKERS)
@@ -39,5 +42,5 @@ wheel-test: $(READY) ## Build the wheel, install it alone, run the tests against
 	cd $(WHEEL_VENV) && bin/pytest -n $(WORKERS) -c '$(CURDIR)/pyproject.toml' --installed '$(CURDIR)/tests' --pyargs groundmap planners
 
 clean: ## Remove everything that the other targets made
-	rm -rf .venv $(WHEEL_VENV) dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf .venv $(WHEEL_VENV) dist groundmap-demo .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find groundmap planners tests tools -name __pycache__ -type d -prune -exec rm -rf {} +

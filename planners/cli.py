@@ -11,6 +11,7 @@ from typer.exceptions import TyperException
 
 from groundmap.errors import GroundmapError
 from planners.commands.convert import convert_command
+from planners.commands.demo import demo_command
 from planners.commands.evaluate import evaluate_command
 from planners.commands.info import info_command
 from planners.commands.map import map_command
@@ -24,10 +25,11 @@ DONE, BAD_INPUT, NO_ROUTE, INTERRUPTED = 0, 2, 3, 130
 app = typer.Typer(
     name="groundmap",
     help="From sparse stereo features to a map one can plan on. Metres, radians, seconds.",
-    no_args_is_help=True,
     add_completion=False,
+    rich_markup_mode=None,  # it would take the units, such as [m], for markup
     pretty_exceptions_enable=False,
 )
+app.command("demo")(demo_command)
 app.command("map")(map_command)
 app.command("plan")(plan_command)
 app.command("plot")(plot_command)
@@ -40,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command and exit: one sentence on stderr where something is wrong."""
     argv = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        code = app(argv, standalone_mode=False) or DONE
+        code = app(argv or ["--help"], standalone_mode=False) or DONE
     except NoRouteError as error:
         code = _refuse(error, str(error), NO_ROUTE, argv)
     except (GroundmapError, PlanningError, OSError) as error:

@@ -1,0 +1,95 @@
+"""``groundmap demo``: the whole way, from a recorded courtyard to a route through its doorway."""
+
+from __future__ import annotations
+
+import shlex
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from groundmap import CellState, GroundMapper, fit_ground, read_views
+from groundmap.archive import check_writable
+from groundmap.errors import FileFormatError
+from planners.commands.plot import draw_map
+from planners.console import JsonOption, emit, watched
+from planners.problem import PlanningProblem
+from planners.registry import plan
+from planners.route import Route
+
+GOAL = (20.5, 2.5)  # [m, map], behind the doorway and the skip
+FOOTPRINT = 0.35  # [m]
+MAP, ROUTE, PICTURE = "map.npz", "route.geojson", "map.png"
+
+
+def demo_command(
+    out: Annotated[Path, typer.Option(help="Folder for map, route and picture.")] = Path(
+        "groundmap-demo"
+    ),
+    as_json: JsonOption = False,
+) -> None:
+    """Map a log that comes along, plan a route on the map, draw both."""
+    _make_folder(out)
+    mapper = map_courtyard()
+    start = mapper.grid.trajectory[0, :2]
+    route = plan(PlanningProblem(mapper.grid, start=start, goal=GOAL, footprint=FOOTPRINT))
+    mapper.grid.save(out / MAP)
+    route.save_geojson(out / ROUTE)
+    draw_map(mapper.grid, out / PICTURE, waypoints=route.waypoints, footprint=FOOTPRINT)
+    result = _summary(mapper, route, out)
+    commands = _next_commands(out, route)
+    if as_json:
+        emit({**result, "next": commands}, as_json=True, title="")
+        return
+    emit(result, as_json=False, title="a courtyard, mapped and crossed")
+    print("\nLook at the picture, then try:", *commands, sep="\n  ")
+
+
+def map_courtyard() -> GroundMapper:
+    """Return a mapper that has seen the log that comes along."""
+    mapper = GroundMapper()
+    with as_file(files("planners") / "demo_data") as folder:
+        log = read_views(folder)
+        for view in watched(fit_ground(log), total=len(log), what="mapping views"):
+            mapper.integrate(view)
+    return mapper
+
+
+def _make_folder(out: Path) -> None:
+    if out.is_file():
+        raise FileFormatError(out, "a folder, or the name of a new one", "a file")
+    if not out.is_dir():
+        check_writable(out)
+        out.mkdir()
+    for name in (MAP, ROUTE, PICTURE):
+        check_writable(out / name)
+
+
+def _summary(mapper: GroundMapper, route: Route, out: Path) -> dict[str, Any]:
+    values = route.to_dict()
+    shown = ("length", "min_clearance", "mean_confidence", "unknown_length", "audit", "waypoints")
+    return {
+        "views": mapper.stats.views,
+        "features_used": mapper.stats.features_used,
+        "area_free_m2": mapper.grid.area(CellState.FREE),
+        "area_nonfree_m2": mapper.grid.area(CellState.NONFREE),
+        "footprint": FOOTPRINT,
+        **{name: values[name] for name in shown},
+        "map": str(out / MAP),
+        "route": str(out / ROUTE),
+        "picture": str(out / PICTURE),
+    }
+
+
+def _next_commands(out: Path, route: Route) -> list[str]:
+    """Return commands that go on from here, ready to be pasted."""
+    folder = out.as_posix()
+    grid, line, doorway = (shlex.quote(f"{folder}/{name}") for name in (MAP, ROUTE, "doorway.png"))
+    back, start = ("{:g},{:g}".format(*route.waypoints[end]) for end in (-1, 0))
+    return [
+        f"groundmap info {grid}",
+        f"groundmap plan {grid} --start {back} --goal {start} --footprint 0.3",
+        f"groundmap plot {grid} --route {line} --footprint {FOOTPRINT} "
+        f"--bounds 10,5,18,14 --out {doorway}",
+    ]
