@@ -67,9 +67,14 @@ class InputError(GroundmapError, ValueError):
         self, name: str, expected: str, got: str, *, where: str = "", hint: str = ""
     ) -> None:
         self.name, self.expected, self.got, self.where, self.hint = name, expected, got, where, hint
-        place = f" at {where}" if where else ""
-        advice = f" {hint}" if hint else ""
-        super().__init__(f"{name}: expected {expected}, got {got}{place}.{advice}")
+        super().__init__(expected_got(name, expected, got, where=where, hint=hint))
+
+
+def expected_got(name: str, expected: str, got: str, *, where: str = "", hint: str = "") -> str:
+    """Return the one sentence (and the advice) that tells of a wrong value."""
+    place = f" at {where}" if where else ""
+    advice = f" {hint}" if hint else ""
+    return f"{name}: expected {expected}, got {got}{place}.{advice}"
 
 
 class SettingsError(InputError):

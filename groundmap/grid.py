@@ -247,22 +247,18 @@ class ConfidenceGrid:
 
     def copy(self) -> ConfidenceGrid:
         """Return a grid of its own with the same content."""
-        twin = self.like()
+        twin = ConfidenceGrid(
+            resolution=self.resolution,
+            origin=self.origin.tolist(),
+            frame=self.frame,
+            rule=self.rule,
+        )
         for index, tile in self.tiles():
             mine = twin.tile(index)
             for layer in LAYERS:
                 getattr(mine, layer)[...] = getattr(tile, layer)
         twin.trajectory = self.trajectory.copy()
         return twin
-
-    def like(self) -> ConfidenceGrid:
-        """Return an empty grid of the same resolution, origin, frame and rule."""
-        return ConfidenceGrid(
-            resolution=self.resolution,
-            origin=self.origin.tolist(),
-            frame=self.frame,
-            rule=self.rule,
-        )
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the grid to one file, without loss; an older file is replaced only at the end.
@@ -272,12 +268,6 @@ class ConfidenceGrid:
         OSError
             The folder does not exist or can't be written to.
         """
-        indices = np.array([index for index, _ in self.tiles()], dtype=np.int64)
-        shape = (len(indices), *self.tile_shape)
-        arrays: dict[str, npt.NDArray[Any]] = {
-            name: np.array([getattr(tile, name) for _, tile in self.tiles()], dtype=kind)
-            for name, kind in LAYERS.items()
-        }
         header = {
             "format": FORMAT,
             "version": VERSION,
@@ -286,9 +276,7 @@ class ConfidenceGrid:
             "frame": self.frame,
             "rule": self.rule.to_dict(),
         }
-        arrays = {name: array.reshape(shape) for name, array in arrays.items()}
-        arrays["tiles"] = indices.reshape(-1, self.ndim)
-        arrays["trajectory"] = self.trajectory
+        arrays = {**self._tiles.to_arrays(), "trajectory": self.trajectory}
         write_archive(path, header, arrays)
 
     @classmethod
@@ -308,31 +296,9 @@ class ConfidenceGrid:
                 frame=header["frame"],
                 rule=rule_from(header["rule"]),
             )
-            indices = _check_tiles(arrays, grid)
-            for row, index in enumerate(indices):
-                tile = grid.tile(index)
-                for name in LAYERS:
-                    getattr(tile, name)[...] = arrays[name][row]
+            grid._tiles = Tiles.from_arrays(grid.ndim, arrays)
             grid.trajectory = as_floats("trajectory", arrays["trajectory"], (None, 3))
             check_finite("trajectory", grid.trajectory)
         except (KeyError, TypeError, ValueError) as error:
             raise FileFormatError(path, "a complete map file", f"{error}") from error
         return grid
-
-
-def _check_tiles(arrays: dict[str, npt.NDArray[Any]], grid: ConfidenceGrid) -> list[Index]:
-    """Return the indices of a file's tiles, once these and the layers are what `save` writes."""
-    tiles = arrays["tiles"]
-    if tiles.dtype != np.int64 or tiles.shape[1:] != (grid.ndim,):
-        raise InputError("tiles", f"int64, shape (n, {grid.ndim})", f"{tiles.dtype}, {tiles.shape}")
-    indices = [tuple(index) for index in tiles.tolist()]
-    if len(set(indices)) != len(indices):
-        raise InputError("tiles", "each tile once", "one that comes twice")
-    shape = (len(indices), *grid.tile_shape)
-    for name, kind in LAYERS.items():
-        if arrays[name].dtype != kind or arrays[name].shape != shape:
-            got = f"{arrays[name].dtype}, {arrays[name].shape}"
-            raise InputError(name, f"{np.dtype(kind)}, shape {shape}", got)
-    if not (np.abs(arrays["confidence"]) <= 1.0).all():
-        raise InputError("confidence", "numbers in [-1, 1]", "others")
-    return indices

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from groundmap.arrays import Counts, Floats32, Ints
+from groundmap.errors import InputError
 
 TILE_SHAPES = {2: (64, 64), 3: (16, 16, 16)}
 LAYERS = {"confidence": np.float32, "count": np.uint32, "drop_offs": np.uint32}
@@ -103,6 +106,39 @@ class Tiles:
                 getattr(dense, name)[there] = getattr(tile, name)[here]
         return dense
 
+    def to_arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """Return all tiles stacked, one array per layer, and their indices as ``tiles``."""
+        indices = np.array([index for index, _ in self.items()], dtype=np.int64)
+        arrays: dict[str, npt.NDArray[Any]] = {"tiles": indices.reshape(-1, len(self.shape))}
+        for name, kind in LAYERS.items():
+            layer = np.array([getattr(tile, name) for _, tile in self.items()], dtype=kind)
+            arrays[name] = layer.reshape(-1, *self.shape)
+        return arrays
+
+    @classmethod
+    def from_arrays(cls, ndim: int, arrays: Mapping[str, npt.NDArray[Any]]) -> Tiles:
+        """Return the tiles that `to_arrays` stacked.
+
+        Raises
+        ------
+        InputError
+            Another type or shape, a tile that comes twice, confidence beyond [-1, 1].
+        KeyError
+            A layer is missing.
+        """
+        tiles = cls(ndim)
+        indices = arrays["tiles"]
+        _check_array("tiles", indices, np.int64, (len(indices), ndim))
+        if len(np.unique(indices, axis=0)) != len(indices):
+            raise InputError("tiles", "each tile once", "one that comes twice")
+        for name, kind in LAYERS.items():
+            _check_array(name, arrays[name], kind, (len(indices), *tiles.shape))
+            for row, index in enumerate(indices.tolist()):
+                getattr(tiles.touch(tuple(index)), name)[...] = arrays[name][row]
+        if not (np.abs(arrays["confidence"]) <= 1.0).all():
+            raise InputError("confidence", "numbers in [-1, 1]", "NaN or numbers beyond")
+        return tiles
+
     def _overlap(
         self, index: Ints, lower: Ints, upper: Ints
     ) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
@@ -113,3 +149,11 @@ class Tiles:
         in_tile = tuple(map(slice, start - corner, stop - corner))
         in_box = tuple(map(slice, start - lower, stop - lower))
         return in_tile, in_box
+
+
+def _check_array(
+    name: str, array: npt.NDArray[Any], kind: npt.DTypeLike, shape: tuple[int, ...]
+) -> None:
+    if array.dtype != kind or array.shape != shape:
+        got = f"{array.dtype} of shape {array.shape}"
+        raise InputError(name, f"{np.dtype(kind)} of shape {shape}", got)

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from typing import Literal, TypeAlias
 
-from groundmap.errors import FactualError
+from groundmap.errors import FactualError, expected_got
 
 Place: TypeAlias = Literal["start", "goal"]
 Point: TypeAlias = tuple[float, float]  #: x, y [m, map]
@@ -50,8 +50,7 @@ class ProblemError(PlanningError, ValueError):
 
     def __init__(self, name: str, expected: str, got: str, *, hint: str = "") -> None:
         self.name, self.expected, self.got, self.hint = name, expected, got, hint
-        advice = f" {hint}" if hint else ""
-        super().__init__(f"{name}: expected {expected}, got {got}.{advice}")
+        super().__init__(expected_got(name, expected, got, hint=hint))
 
 
 class NoRouteError(PlanningError):

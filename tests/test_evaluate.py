@@ -11,7 +11,8 @@ import pytest
 from groundmap import ConfidenceGrid, Features, StereoRig, View, read_views
 from groundmap.arrays import Floats
 from groundmap.errors import InputError
-from groundmap.evaluate import FOLDS, PROTOCOLS, HeldOut, Verdict, evaluate, judge
+from groundmap.evaluate import FOLDS, PROTOCOLS, Verdict, evaluate
+from groundmap.judge import HeldOut, judge
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 NONE = np.empty((0, 2))
