@@ -230,15 +230,10 @@ class ConfidenceGrid:
         return merged
 
     def _check_merge(self, other: ConfidenceGrid) -> None:
-        for name in ("resolution", "frame", "rule"):
+        for name in ("resolution", "frame", "rule", "origin"):
             ours, theirs = getattr(self, name), getattr(other, name)
-            if ours != theirs:
+            if not np.array_equal(ours, theirs):
                 raise MergeError(f"maps add up only with one {name}: expected {ours}, got {theirs}")
-        if not np.array_equal(self.origin, other.origin):
-            raise MergeError(
-                f"maps add up only with one origin: expected {self.origin.tolist()}, "
-                f"got {other.origin.tolist()}"
-            )
         if not self.rule.mergeable:
             raise MergeError(
                 f"the rule {self.rule.name!r} depends on the order of the views, so its maps "

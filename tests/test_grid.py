@@ -257,7 +257,7 @@ def test_trajectories_are_joined_by_merging() -> None:
         (ConfidenceGrid(resolution=1.0, frame="odom"), "one frame: expected map, got odom"),
         (
             ConfidenceGrid(resolution=1.0, origin=(0.0, 0.5)),
-            r"one origin: expected \[0.0, 0.0\], got \[0.0, 0.5\]",
+            r"one origin: expected \[0. 0.\], got \[0.  0.5\]",
         ),
         (ConfidenceGrid(resolution=1.0, origin=(0, 0, 0)), "one origin"),
         (ConfidenceGrid(resolution=1.0, rule=Capped(50)), "one rule"),
