@@ -14,6 +14,7 @@ import typer
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
+from rich.text import Text
 
 T = TypeVar("T")
 
@@ -33,7 +34,7 @@ def emit(result: Mapping[str, Any], *, as_json: bool, title: str) -> None:
     table = Table(show_header=False, box=None)
     for name, value in result.items():
         if name != "waypoints":
-            table.add_row(name.replace("_", " "), _shown(value))
+            table.add_row(name.replace("_", " "), Text(_shown(value)))  # no markup in values
     Console().print(table)
 
 
@@ -45,7 +46,9 @@ def emit_columns(columns: Mapping[str, Mapping[str, Any]], *, title: str) -> Non
     for name in columns:
         table.add_column(name, justify="right")
     for key in next(iter(columns.values())):
-        table.add_row(key.replace("_", " "), *(_shown(column[key]) for column in columns.values()))
+        table.add_row(
+            key.replace("_", " "), *(Text(_shown(column[key])) for column in columns.values())
+        )
     Console().print(table)
 
 

@@ -107,7 +107,7 @@ class UnknownSpaceError(NoRouteError):
     --------
     >>> print(UnknownSpaceError("start", (0.0, 0.0), clearance=0.25, needed=0.9))
     start (0.00, 0.00): the footprint (radius 0.90 m) overlaps unknown or contested space, which \
-begins 0.25 m away. Map that place, or plan with unknown='allow'.
+begins 0.25 m away. Map that place, or plan with unknown='allow' (--unknown allow).
     """
 
     def __init__(self, place: Place, xy: Point, *, clearance: float, needed: float) -> None:
@@ -115,7 +115,7 @@ begins 0.25 m away. Map that place, or plan with unknown='allow'.
         super().__init__(
             f"{_at(place, xy)}: the footprint (radius {needed:.2f} m) overlaps unknown or "
             f"contested space, which begins {clearance:.2f} m away. "
-            "Map that place, or plan with unknown='allow'."
+            "Map that place, or plan with unknown='allow' (--unknown allow)."
         )
 
 

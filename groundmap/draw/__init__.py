@@ -5,12 +5,13 @@ apart in greyscale, too: free is the lightest, unknown darker, contested darker 
 nearly black.
 """
 
-from groundmap.draw.figure import new_figure, save_figure
+from groundmap.draw.figure import check_picture, new_figure, save_figure
 from groundmap.draw.maps import draw_grid, draw_trajectory, draw_verdicts, known_bounds
 from groundmap.draw.routes import draw_route
 from groundmap.draw.views import draw_view
 
 __all__ = [
+    "check_picture",
     "draw_grid",
     "draw_route",
     "draw_trajectory",

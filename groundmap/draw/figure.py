@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.archive import write_atomically
-from groundmap.arrays import as_floats
+from groundmap.archive import check_writable, write_atomically
+from groundmap.arrays import as_floats, check_finite
 from groundmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -29,11 +29,20 @@ def new_figure(bounds: npt.ArrayLike) -> tuple[Figure, Axes]:
     ----------
     bounds : array_like, shape (4,)
         xmin, ymin, xmax, ymax [m, map].
+
+    Raises
+    ------
+    InputError
+        Bounds that are not finite, or hold nothing.
     """
     from matplotlib.figure import Figure
 
-    xmin, ymin, xmax, ymax = as_floats("bounds", bounds, (4,))
+    box = as_floats("bounds", bounds, (4,))
+    check_finite("bounds", box)
+    xmin, ymin, xmax, ymax = box
     width, height = xmax - xmin, ymax - ymin
+    if not (width > 0 and height > 0):
+        raise InputError("bounds", "XMIN < XMAX and YMIN < YMAX [m]", str(box.tolist()))
     scale = LONG_SIDE / max(width, height)
     figure = Figure(
         figsize=(max(width * scale, 4.5) + 0.9, max(height * scale, 3.0) + 1.3),
@@ -56,10 +65,24 @@ def save_figure(figure: Figure, path: str | PathLike[str], *, dpi: int = 130) ->
     InputError
         Another kind of file.
     """
+    check_picture(path)
     suffix = Path(path).suffix.lower()
-    if suffix not in PICTURE_FORMATS:
-        raise InputError("plot", f"a file name ending in {', '.join(PICTURE_FORMATS)}", str(path))
     write_atomically(path, lambda stream: figure.savefig(stream, format=suffix[1:], dpi=dpi))
+
+
+def check_picture(path: str | PathLike[str]) -> None:
+    """Check that a picture can be written there, before the work that it is to show.
+
+    Raises
+    ------
+    InputError
+        Another suffix than .png, .pdf or .svg.
+    FileFormatError
+        The folder does not exist, or the path is a folder itself.
+    """
+    if Path(path).suffix.lower() not in PICTURE_FORMATS:
+        raise InputError("plot", f"a file name ending in {', '.join(PICTURE_FORMATS)}", str(path))
+    check_writable(path)
 
 
 def scale_bar(ax: Axes) -> list[Artist]:

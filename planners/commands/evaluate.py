@@ -8,8 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from groundmap import read_views
-from groundmap.archive import check_writable
+from groundmap import draw, read_views
 from groundmap.evaluate import Verdict, evaluate
 from planners.commands.settings_file import ConfigOption, read_settings
 from planners.console import JsonOption, emit, emit_columns, watched
@@ -28,7 +27,7 @@ def evaluate_command(
 ) -> None:
     """Judge maps of a log by the features held out of them; shares, 0 to 1."""
     if plot is not None:
-        check_writable(plot)
+        draw.check_picture(plot)
     log = read_views(source, poses=poses)
 
     def watch(steps: list[Any]) -> Any:
@@ -45,8 +44,6 @@ def evaluate_command(
 
 
 def _draw(verdict: Verdict, picture: Path) -> None:
-    from groundmap import draw  # loads matplotlib: only when there is something to draw
-
     figure, axes = draw.new_figure(draw.known_bounds(verdict.grid))
     draw.draw_grid(verdict.grid, ax=axes)
     draw.draw_trajectory(verdict.grid.trajectory, ax=axes)

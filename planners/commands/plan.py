@@ -9,6 +9,7 @@ import typer
 
 from groundmap import ConfidenceGrid
 from groundmap.archive import check_writable
+from groundmap.draw import check_picture
 from planners.commands.plot import draw_map
 from planners.console import JsonOption, emit, numbers
 from planners.problem import PlanningProblem
@@ -37,9 +38,10 @@ def plan_command(
     as_json: JsonOption = False,
 ) -> None:
     """Plan a collision-free route on a map."""
-    for path in (out, plot):
-        if path is not None:
-            check_writable(path)
+    if out is not None:
+        check_writable(out)
+    if plot is not None:
+        check_picture(plot)
     problem = PlanningProblem(
         ConfidenceGrid.load(map_file),
         start=numbers("start", start, 2, 3),

@@ -10,8 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from groundmap import ConfidenceGrid, GroundMapper, fit_ground, read_views
-from groundmap.archive import check_writable
+from groundmap import ConfidenceGrid, GroundMapper, draw, fit_ground, read_views
 from groundmap.arrays import Floats, as_floats
 from groundmap.errors import FileFormatError, InputError
 from planners.commands.settings_file import ConfigOption, read_settings
@@ -41,7 +40,7 @@ def plot_command(
 ) -> None:
     """Draw a map: free, non-free, contested and unknown space, and where it was seen from."""
     picture = out or map_file.with_suffix(".png")
-    check_writable(picture)
+    draw.check_picture(picture)
     if explain is not None:
         _draw_view(map_file, explain, read_settings(config), picture)
         emit({"out": str(picture)}, as_json=as_json, title=f"view {explain} of {map_file}")
@@ -62,8 +61,6 @@ def draw_map(
     footprint: float = 0.0,
 ) -> None:
     """Draw a map, its trajectory and a route into a file."""
-    from groundmap import draw  # loads matplotlib: only when there is something to draw
-
     box = draw.known_bounds(grid) if bounds is None else bounds
     figure, axes = draw.new_figure(box)
     draw.draw_grid(grid, bounds=box, ax=axes)
@@ -75,8 +72,6 @@ def draw_map(
 
 def _draw_view(source: Path, number: int, settings: dict[str, dict[str, Any]], out: Path) -> None:
     """Draw one view of a log, taken apart, into a file."""
-    from groundmap import draw  # loads matplotlib: only when there is something to draw
-
     log = read_views(source)
     if not 0 <= number < len(log):
         raise InputError("explain", f"a view from 0 to {len(log) - 1}", str(number))
