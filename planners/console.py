@@ -13,8 +13,6 @@ from typing import Annotated, Any, TypeVar
 import typer
 from rich.console import Console
 from rich.progress import track
-from rich.table import Table
-from rich.text import Text
 
 T = TypeVar("T")
 
@@ -30,26 +28,20 @@ def emit(result: Mapping[str, Any], *, as_json: bool, title: str) -> None:
     if as_json:
         print(json.dumps(result))
         return
-    print(title)
-    table = Table(show_header=False, box=None)
-    for name, value in result.items():
-        if name != "waypoints":
-            table.add_row(name.replace("_", " "), Text(_shown(value)))  # no markup in values
-    Console().print(table)
+    shown = {name.replace("_", " "): _shown(result[name]) for name in result if name != "waypoints"}
+    width = max(map(len, shown))
+    print(title, *(f"  {name:<{width}}  {value}" for name, value in shown.items()), sep="\n")
 
 
 def emit_columns(columns: Mapping[str, Mapping[str, Any]], *, title: str) -> None:
     """Print results side by side for people: a column for each, a row for each of their keys."""
+    keys = list(next(iter(columns.values())))
+    width = max(map(len, keys))
     print(title)
-    table = Table(box=None)
-    table.add_column("")
-    for name in columns:
-        table.add_column(name, justify="right")
-    for key in next(iter(columns.values())):
-        table.add_row(
-            key.replace("_", " "), *(Text(_shown(column[key])) for column in columns.values())
-        )
-    Console().print(table)
+    print(" " * width, *(f"{name:>10}" for name in columns), sep="  ")
+    for key in keys:
+        cells = (f"{_shown(column[key]):>10}" for column in columns.values())
+        print(f"{key.replace('_', ' '):<{width}}", *cells, sep="  ")
 
 
 def say(message: str) -> None:

@@ -249,7 +249,7 @@ def test_a_picture_of_another_kind_is_refused_before_the_route_is_written(
 def test_names_with_brackets_are_printed_as_they_are(square: Path, tmp_path: Path) -> None:
     ran = run("convert", square, tmp_path / "y[m].npz")
     assert ran.code == 0
-    assert "y[m].npz" in ran.out.replace("\n", "").replace(" ", "")
+    assert str(tmp_path / "y[m].npz") in ran.out
 
 
 def test_convert_writes_dense_arrays(map_file: Path, tmp_path: Path) -> None:
