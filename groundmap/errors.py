@@ -39,12 +39,8 @@ def _again(kind: type[FactualError], args: tuple[Any, ...], facts: dict[str, Any
     return error
 
 
-class GroundmapError(FactualError):
-    """Base of every exception of this package."""
-
-
-class InputError(GroundmapError, ValueError):
-    """A value is not what was asked for.
+class WrongValueError(FactualError, ValueError):
+    """A value is not what was asked for: what both packages' errors about input are.
 
     Parameters
     ----------
@@ -56,25 +52,29 @@ class InputError(GroundmapError, ValueError):
         The first place that offends, such as ``"row 3"``.
     hint : str, optional
         What to do about it.
-
-    Examples
-    --------
-    >>> print(InputError("baseline", "a number above 0 [m]", "0.0", hint="Give the rig's."))
-    baseline: expected a number above 0 [m], got 0.0. Give the rig's.
     """
 
     def __init__(
         self, name: str, expected: str, got: str, *, where: str = "", hint: str = ""
     ) -> None:
         self.name, self.expected, self.got, self.where, self.hint = name, expected, got, where, hint
-        super().__init__(expected_got(name, expected, got, where=where, hint=hint))
+        place = f" at {where}" if where else ""
+        advice = f" {hint}" if hint else ""
+        super().__init__(f"{name}: expected {expected}, got {got}{place}.{advice}")
 
 
-def expected_got(name: str, expected: str, got: str, *, where: str = "", hint: str = "") -> str:
-    """Return the one sentence (and the advice) that tells of a wrong value."""
-    place = f" at {where}" if where else ""
-    advice = f" {hint}" if hint else ""
-    return f"{name}: expected {expected}, got {got}{place}.{advice}"
+class GroundmapError(FactualError):
+    """Base of every exception of this package."""
+
+
+class InputError(GroundmapError, WrongValueError):
+    """A value is not what was asked for.
+
+    Examples
+    --------
+    >>> print(InputError("baseline", "a number above 0 [m]", "0.0", hint="Give the rig's."))
+    baseline: expected a number above 0 [m], got 0.0. Give the rig's.
+    """
 
 
 class SettingsError(InputError):

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from typing import Literal, TypeAlias
 
-from groundmap.errors import FactualError, expected_got
+from groundmap.errors import FactualError, WrongValueError
 
 Place: TypeAlias = Literal["start", "goal"]
 Point: TypeAlias = tuple[float, float]  #: x, y [m, map]
@@ -30,27 +30,14 @@ class PlanningError(FactualError):
     """Base of every exception of this package."""
 
 
-class ProblemError(PlanningError, ValueError):
+class ProblemError(PlanningError, WrongValueError):
     """A problem that can't be posed.
-
-    Parameters
-    ----------
-    name : str
-        What the value is called where the caller wrote it.
-    expected, got : str
-        What it should have been, and what it is.
-    hint : str, optional
-        What to do about it.
 
     Examples
     --------
     >>> print(ProblemError("footprint", "a radius of 0 or more [m]", "-0.5"))
     footprint: expected a radius of 0 or more [m], got -0.5.
     """
-
-    def __init__(self, name: str, expected: str, got: str, *, hint: str = "") -> None:
-        self.name, self.expected, self.got, self.hint = name, expected, got, hint
-        super().__init__(expected_got(name, expected, got, hint=hint))
 
 
 class NoRouteError(PlanningError):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from groundmap.arrays import Floats, Ints
+from groundmap.arrays import Bools, Floats, Ints
 
 NO_EDGE = -1
 
@@ -41,7 +41,20 @@ def upper_envelope(t0: Floats, t1: Floats, a: Floats, b: Floats) -> tuple[Floats
 
 
 @njit(cache=True, nogil=True)
-def _merge(low, high, edge, i, i1, j1, a, b, new_low, new_high, new_edge, size):  # type: ignore[no-untyped-def]
+def _merge(
+    low: Floats,
+    high: Floats,
+    edge: Ints,
+    i: int,
+    i1: int,
+    j1: int,
+    a: Floats,
+    b: Floats,
+    new_low: Floats,
+    new_high: Floats,
+    new_edge: Ints,
+    size: int,
+) -> int:
     """Merge the envelopes i..i1 and i1..j1 into the new arrays from `size` on."""
     j, start, here = i1, size, -np.inf
     while i < i1 or j < j1:
@@ -66,7 +79,16 @@ def _merge(low, high, edge, i, i1, j1, a, b, new_low, new_high, new_edge, size):
 
 
 @njit(cache=True, nogil=True)
-def _append(lower, upper, edge, low, high, edges, start, size):  # type: ignore[no-untyped-def]
+def _append(
+    lower: float,
+    upper: float,
+    edge: int,
+    low: Floats,
+    high: Floats,
+    edges: Ints,
+    start: int,
+    size: int,
+) -> int:
     """Append a piece, or lengthen the last one if it goes on."""
     if upper <= lower:
         return size
@@ -78,7 +100,19 @@ def _append(lower, upper, edge, low, high, edges, start, size):  # type: ignore[
 
 
 @njit(cache=True, nogil=True)
-def _append_higher(lower, upper, i, j, a, b, low, high, edges, start, size):  # type: ignore[no-untyped-def]
+def _append_higher(
+    lower: float,
+    upper: float,
+    i: int,
+    j: int,
+    a: Floats,
+    b: Floats,
+    low: Floats,
+    high: Floats,
+    edges: Ints,
+    start: int,
+    size: int,
+) -> int:
     """Append the higher of two edges, and the other one behind their crossing, if they cross."""
     da, db = a[i] - a[j], b[i] - b[j]
     at_lower = da * np.cos(lower) + db * np.sin(lower)
@@ -99,7 +133,9 @@ def _append_higher(lower, upper, i, j, a, b, low, high, edges, start, size):  # 
 
 
 @njit(cache=True, nogil=True)
-def fill_gaps(low, high, edge, gap_low, gap_high, gap_edge):  # type: ignore[no-untyped-def]
+def fill_gaps(
+    low: Floats, high: Floats, edge: Ints, gap_low: Floats, gap_high: Floats, gap_edge: Ints
+) -> tuple[Floats, Floats, Ints, Bools]:
     """Put pieces of a second envelope where the first has none.
 
     Returns (lower bearing, upper bearing, edge, from the second envelope), in order.

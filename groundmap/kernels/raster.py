@@ -41,7 +41,7 @@ def fill_star(
 
 
 @njit(cache=True, nogil=True)
-def _flip_right_of(odd, p, q):  # type: ignore[no-untyped-def]
+def _flip_right_of(odd: Bytes, p: Floats, q: Floats) -> None:
     """Flip, in each row that the edge p-q spans, the first cell whose centre is right of it."""
     if p[1] > q[1]:
         p, q = q, p
@@ -56,7 +56,7 @@ def _flip_right_of(odd, p, q):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _first_centre(coordinate):  # type: ignore[no-untyped-def]
+def _first_centre(coordinate: float) -> int:
     """Return the first cell whose centre is at or after a coordinate."""
     return int(np.ceil(coordinate - 0.5))
 
@@ -94,7 +94,7 @@ def draw_surfaces(
 
 
 @njit(cache=True, nogil=True)
-def _fill_quadrangle(z, corners, value):  # type: ignore[no-untyped-def]
+def _fill_quadrangle(z: Floats32, corners: Floats, value: np.float32) -> None:
     lowest, highest = corners[:, 1].min(), corners[:, 1].max()
     crossings = np.empty(4)
     for row in range(max(_first_centre(lowest), 0), min(_first_centre(highest), z.shape[0])):
@@ -116,7 +116,7 @@ def _fill_quadrangle(z, corners, value):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _fill_disc(z, centre, radius, value):  # type: ignore[no-untyped-def]
+def _fill_disc(z: Floats32, centre: Floats, radius: float, value: np.float32) -> None:
     for row in range(
         max(_first_centre(centre[1] - radius), 0),
         min(_first_centre(centre[1] + radius) + 1, z.shape[0]),
@@ -132,7 +132,7 @@ def _fill_disc(z, centre, radius, value):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _draw_line(z, p, q, value):  # type: ignore[no-untyped-def]
+def _draw_line(z: Floats32, p: Floats, q: Floats, value: np.float32) -> None:
     """Visit the cells from p to q in order (Amanatides and Woo 1987)."""
     col, row = int(np.floor(p[0])), int(np.floor(p[1]))
     last_col, last_row = int(np.floor(q[0])), int(np.floor(q[1]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, cast
 
 import typer
 
@@ -12,7 +12,7 @@ from groundmap.archive import check_writable
 from groundmap.draw import check_picture
 from planners.commands.plot import draw_map
 from planners.console import JsonOption, emit, numbers
-from planners.problem import PlanningProblem
+from planners.problem import PlanningProblem, Unknown
 from planners.registry import PLANNERS, plan
 
 
@@ -47,7 +47,7 @@ def plan_command(
         start=numbers("start", start, 2, 3),
         goal=numbers("goal", goal, 2, 3),
         footprint=footprint,
-        unknown=unknown,  # type: ignore[arg-type]  # the problem checks it, with its own sentence
+        unknown=cast(Unknown, unknown),  # the problem refuses others, in its own words
         clear_start=clear_start,
     )
     route = plan(problem, planner=planner, time_limit=time_limit)
