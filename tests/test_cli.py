@@ -155,7 +155,12 @@ def test_plan_counts_unknown_space_where_that_is_allowed(square: Path) -> None:
 @pytest.mark.parametrize(
     ("goal", "options", "error", "sentence"),
     [
-        (BEYOND, (), "OutsideMapError", "goal (90.00, 5.00): expected a place on the map"),
+        (
+            BEYOND,
+            (),
+            "OutsideMapError",
+            "goal (90.00, 5.00): outside the map: expected a place on it",
+        ),
         (ON_RING, (), "NonFreeError", "overlaps non-free space"),
         (IN_STRIP, (), "UnknownSpaceError", "overlaps unknown or contested space"),
         (INSIDE_RING, (), "EnclosedError", "the goal is fenced in"),
