@@ -50,8 +50,8 @@ class OutsideMapError(NoRouteError):
     Examples
     --------
     >>> print(OutsideMapError("goal", (90.0, 4.0), bounds=(0.0, -9.75, 48.77, 9.75)))
-    goal (90.00, 4.00): outside the map: expected a place on it, which spans x 0.00 to 48.77 m and y \
--9.75 to 9.75 m (box around the touched tiles); nothing was ever seen near it.
+    goal (90.00, 4.00): outside the map: expected a place on it, which spans x 0.00 to 48.77 m and \
+y -9.75 to 9.75 m (box around the touched tiles); nothing was ever seen near it.
     """
 
     def __init__(self, place: Place, xy: Point, *, bounds: tuple[float, ...]) -> None:

@@ -73,7 +73,8 @@ def test_an_unknown_planner_is_refused_with_what_there_is() -> None:
 @pytest.mark.parametrize("place", ["start", "goal"])
 @pytest.mark.parametrize("xy", [(1000, 0), (-5, 5), (64.5, -70)])
 def test_places_beyond_the_touched_tiles_are_outside(place: str, xy: tuple[float, float]) -> None:
-    sentence = rf"{place} \({xy[0]:.2f}, {xy[1]:.2f}\): outside the map: expected a place on it.*0.00 to 64.00"
+    where = rf"{place} \({xy[0]:.2f}, {xy[1]:.2f}\)"
+    sentence = rf"{where}: outside the map: expected a place on it.*0.00 to 64.00"
     asked: dict[str, Any] = {place: xy}
     with pytest.raises(OutsideMapError, match=sentence) as caught:
         plan(problem(**asked))
