@@ -4,6 +4,7 @@ WORKERS ?= auto
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
 BIN := .venv/bin
+INSTALLED := .venv/.installed
 READY := .venv/.ready
 WHEEL_VENV := .wheel-venv
 
@@ -14,13 +15,17 @@ help: ## Show this list
 
 setup: $(READY) ## Create .venv with the project (editable) and its tools
 
-$(READY): pyproject.toml
+$(INSTALLED): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "groundmap needs Python 3.11 or newer; name one: make PYTHON=python3.11")'
 	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --editable .
+	@touch $@
+
+$(READY): $(INSTALLED)
 	$(BIN)/python -m pip install --quiet --editable '.[dev]'
 	@touch $@
 
-demo: $(READY) ## Map a recorded courtyard and plan through it; writes groundmap-demo/
+demo: $(INSTALLED) ## Map a recorded courtyard and plan through it; writes groundmap-demo/
 	$(BIN)/groundmap demo
 
 test: $(READY) ## Run the tests and the doctests
