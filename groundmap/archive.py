@@ -23,6 +23,7 @@ from groundmap.errors import FileFormatError
 def write_atomically(path: str | PathLike[str], write: Callable[[IO[bytes]], object]) -> None:
     """Call `write` on a temporary file beside `path`, then rename it: all or nothing."""
     target = Path(path)
+    _check_regular(target)
     handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
     try:
         with os.fdopen(handle, "wb") as stream:
@@ -91,18 +92,28 @@ def read_archive(
     return header, arrays
 
 
-def check_writable(path: str | PathLike[str]) -> None:
+def check_writable(path: str | PathLike[str], *, source: str | PathLike[str] | None = None) -> None:
     """Check that a file can be written there, before the work whose result it is to hold.
 
     Raises
     ------
     FileFormatError
-        The folder does not exist, or the path is a folder itself.
+        The folder does not exist, the path is a folder, a device or the like, or it is the file
+        `source` that the work reads.
     """
     target = Path(path)
     if target.is_dir():
         raise FileFormatError(target, "a file name", "a folder")
+    if source is not None and target.resolve() == Path(source).resolve():
+        raise FileFormatError(target, "another file than the one that is read", "the same")
+    _check_regular(target)
     if not target.parent.is_dir():
         raise FileFormatError(
             target, "a file in a folder that exists", f"no folder {target.parent}"
         )
+
+
+def _check_regular(target: Path) -> None:
+    """Refuse to replace a device, a pipe or the like by a file."""
+    if target.exists() and not (target.is_file() or target.is_dir()):
+        raise FileFormatError(target, "a file, or the name of a new one", "something else")

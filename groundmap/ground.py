@@ -13,6 +13,7 @@ from groundmap.features import View
 
 STEEPEST_SIGHT = np.radians(60.0)  # beyond this a camera looks at the ground or the sky
 MOST_LEAN = np.radians(45.0)  # between "up" of the base and z of the map
+FARTHEST = 1e8  # [m] from the origin: UTM fits in, a diverged pose does not
 TILT_FLOOR = 0.005  # [rad], a real road is no plane: more features don't make it one
 
 
@@ -83,10 +84,15 @@ def check_camera(view: View) -> None:
 
     Raises
     ------
+    InputError
+        It stands farther off than any map reaches.
     NoGroundPlaneError
         Its axis is more than 60 degrees off the horizontal, or up is not up in the map.
     """
-    axis_up = float(view.T_map_camera[2, 2])
+    farthest = float(np.abs(view.T_map_base[:3, 3]).max())
+    if farthest > FARTHEST:
+        raise InputError("T_map_base", f"a position within {FARTHEST:g} m", f"{farthest:g} m")
+    axis_up = float(np.clip(view.T_map_camera[2, 2], -1.0, 1.0))
     if abs(axis_up) > np.sin(STEEPEST_SIGHT):
         looks = "sky" if axis_up > 0 else "ground"
         raise NoGroundPlaneError(

@@ -16,6 +16,7 @@ from groundmap.frames import invert
 from groundmap.ground import TILT_FLOOR, GroundPlane, check_camera
 from groundmap.settings import GroundSettings
 
+REACH = 3.0  # [max_range], features farther from the camera are of another place
 NOISE_FLOOR = 0.03  # [m], what even near features are off a real road's plane
 TILTS = np.stack(
     np.meshgrid(
@@ -173,6 +174,8 @@ def _cloud(view: View, window: list[_Seen], options: GroundSettings) -> _Cloud:
     points += T_base_map[:3, 3] - view.rig.T_base_camera[:3, 3]
     level = points @ _level_axes(view.rig).T
     low = (-options.highest_camera < level[:, 2]) & (level[:, 2] < -options.lowest_camera)
+    # Views that a jump of the poses carried far off say nothing about this place.
+    low &= np.hypot(level[:, 0], level[:, 1]) <= REACH * options.max_range
     sigmas = np.concatenate([seen.sigmas for seen in window])[low]
     return _Cloud(level[low], sigmas, 1.0 / (sigmas**2 + NOISE_FLOOR**2))
 

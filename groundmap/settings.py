@@ -56,7 +56,7 @@ def _nearest(key: str, known: list[str]) -> str:
 class MapperSettings(Settings):
     """All that `groundmap.GroundMapper` can be told; lengths in metres, angles in radians."""
 
-    resolution: float = Field(0.1524, gt=0, description="size of a cell [m]; 6 inches")
+    resolution: float = Field(0.1524, gt=0, le=1000, description="size of a cell [m]; 6 inches")
     mode: Literal["2d"] = Field("2d", description="ground plane (2d)")
     frame: str = Field("map", description="name of the frame the map is in")
     fusion: Literal["average", "capped"] = Field("average", description="how views add up")

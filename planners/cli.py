@@ -43,6 +43,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     argv = list(sys.argv[1:] if arguments is None else arguments)
     try:
         code = app(argv or ["--help"], standalone_mode=False) or DONE
+        if code == INTERRUPTED:  # typer has turned the key into an exit code
+            say("groundmap: interrupted")
     except NoRouteError as error:
         code = _refuse(error, str(error), NO_ROUTE, argv)
     except (GroundmapError, PlanningError, OSError) as error:

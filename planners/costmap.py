@@ -10,10 +10,12 @@ import numpy.typing as npt
 
 from groundmap.arrays import Bools, Bytes, Floats, Ints
 from groundmap.window import CellState, GridWindow
+from planners.errors import ProblemError
 from planners.kernels.clearance import line_clearance
 from planners.lattice import NOWHERE, allowed_moves, squared_clearance, squared_need
 from planners.problem import PlanningProblem
 
+MOST_CELLS = 2**25  # of a costmap: its lattice takes about 100 bytes for each
 SLACK = 5e-10  # [m] shortfall of clearance that is put down to the rounding of coordinates
 
 
@@ -107,6 +109,14 @@ def _padded_window(problem: PlanningProblem) -> GridWindow:
         bounds[2:] = np.maximum(bounds[2:], start + problem.clear_radius)
     # One cell and a half: borders that rounding moves by a cell must not swallow the ring.
     ring = 1.5 * grid.resolution * np.array([-1, -1, 1, 1])
+    cells = float(np.prod((bounds[2:] - bounds[:2]) / grid.resolution))
+    if cells > MOST_CELLS:
+        raise ProblemError(
+            "footprint",
+            f"one that leaves {MOST_CELLS} cells of map and cleared start at most",
+            f"radius {problem.footprint:g} m, which makes {cells:.3g}",
+            hint="Give a smaller footprint or clear_start_radius, or map with larger cells.",
+        )
     return grid.window(bounds + ring)
 
 

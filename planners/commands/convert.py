@@ -22,6 +22,6 @@ def convert_command(
     as_json: JsonOption = False,
 ) -> None:
     """Write a map in another program's form."""
-    check_writable(out)
+    check_writable(out, source=map_file)
     export(ConfidenceGrid.load(map_file), out)
     emit({"out": str(out)}, as_json=as_json, title=f"converted {map_file}")

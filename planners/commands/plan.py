@@ -39,7 +39,7 @@ def plan_command(
 ) -> None:
     """Plan a collision-free route on a map."""
     if out is not None:
-        check_writable(out)
+        check_writable(out, source=map_file)
     if plot is not None:
         check_picture(plot)
     problem = PlanningProblem(

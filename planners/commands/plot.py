@@ -29,6 +29,10 @@ def plot_command(
         int | None,
         typer.Option(metavar="VIEW", help="Take view number VIEW of a log apart, from 0."),
     ] = None,
+    camera_height: Annotated[
+        float | None,
+        typer.Option(help="With --explain: height of the camera above level ground [m]."),
+    ] = None,
     config: ConfigOption = None,
     bounds: Annotated[
         str | None,
@@ -42,7 +46,7 @@ def plot_command(
     picture = out or map_file.with_suffix(".png")
     draw.check_picture(picture)
     if explain is not None:
-        _draw_view(map_file, explain, read_settings(config), picture)
+        _draw_view(map_file, explain, camera_height, read_settings(config), picture)
         emit({"out": str(picture)}, as_json=as_json, title=f"view {explain} of {map_file}")
         return
     grid = ConfidenceGrid.load(map_file)
@@ -70,13 +74,19 @@ def draw_map(
     draw.save_figure(figure, picture)
 
 
-def _draw_view(source: Path, number: int, settings: dict[str, dict[str, Any]], out: Path) -> None:
+def _draw_view(
+    source: Path,
+    number: int,
+    camera_height: float | None,
+    settings: dict[str, dict[str, Any]],
+    out: Path,
+) -> None:
     """Draw one view of a log, taken apart, into a file."""
     log = read_views(source)
     if not 0 <= number < len(log):
         raise InputError("explain", f"a view from 0 to {len(log) - 1}", str(number))
     mapper = GroundMapper(**settings["mapper"])
-    views = fit_ground(log, **settings["ground"])
+    views = fit_ground(log, camera_height=camera_height, **settings["ground"])
     parts = mapper.explain(next(islice(views, number, None)))
     figure = draw.draw_view(parts, mapper.grid, title=f"view {number} of {source}")
     draw.save_figure(figure, out)
