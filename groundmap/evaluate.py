@@ -33,10 +33,15 @@ class Verdict(NamedTuple):
 
 # Fold, number of the view, view: what of it is mapped, what is held out.
 Split = Callable[[int, int, View], tuple[View | None, View | None]]
+Mapped = Callable[[Iterable[View], dict[str, Any], dict[str, Any]], ConfidenceGrid]
 
 
 def evaluate(
-    views: Iterable[View], *, watch: Callable[[list[Any]], Iterable[Any]] = iter, **settings: Any
+    views: Iterable[View],
+    *,
+    watch: Callable[[list[Any]], Iterable[Any]] = iter,
+    ground: dict[str, Any] | None = None,
+    **settings: Any,
 ) -> dict[str, Verdict]:
     """Map a part of a log and judge the map by the rest, in three ways and with a baseline.
 
@@ -50,6 +55,8 @@ def evaluate(
     views : iterable of View
     watch : callable
         Wraps the list of steps, to show progress.
+    ground : dict, optional
+        `groundmap.settings.GroundSettings` of the maps; the judge keeps its own.
     **settings
         `groundmap.settings.MapperSettings`.
 
@@ -66,7 +73,7 @@ def evaluate(
     for name, fold in watch([(name, fold) for name in PROTOCOLS for fold in range(FOLDS)]):
         split, mapped_by = PROTOCOLS[name]
         parts = [split(fold, number, view) for number, view in enumerate(judged)]
-        grid = mapped_by((view for view, _ in parts if view is not None), settings)
+        grid = mapped_by((view for view, _ in parts if view is not None), settings, ground or {})
         held_out = sort_by_height(view for _, view in parts if view is not None)
         tallies[name] = tallies[name].plus(judge(grid, held_out, trajectory))
         verdicts[name] = Verdict(tallies[name].figures(), grid, held_out)
@@ -111,15 +118,19 @@ def _only(view: View, keep: Bools) -> View:
     return replace(view, points=view.points.select(keep))
 
 
-def _mapped(views: Iterable[View], settings: dict[str, Any]) -> ConfidenceGrid:
+def _mapped(
+    views: Iterable[View], settings: dict[str, Any], ground: dict[str, Any]
+) -> ConfidenceGrid:
     """Map as a user would: the ground, too, is fitted to what is mapped, and nothing else."""
     mapper = GroundMapper(**settings)
-    for view in fit_ground(views):
+    for view in fit_ground(views, **ground):
         mapper.integrate(view)
     return mapper.grid
 
 
-def _stamped(views: Iterable[View], settings: dict[str, Any]) -> ConfidenceGrid:
+def _stamped(
+    views: Iterable[View], settings: dict[str, Any], _ground: dict[str, Any]
+) -> ConfidenceGrid:
     """Map without triangulation: free discs at ground features, non-free ones at obstacles."""
     grid = GroundMapper(**settings).grid
     for view in views:
@@ -140,7 +151,7 @@ def _stamped(views: Iterable[View], settings: dict[str, Any]) -> ConfidenceGrid:
     return grid
 
 
-PROTOCOLS: dict[str, tuple[Split, Callable[[Iterable[View], dict[str, Any]], ConfidenceGrid]]] = {
+PROTOCOLS: dict[str, tuple[Split, Mapped]] = {
     "views": (_by_view, _mapped),
     "ids": (_by_id, _mapped),
     "thin": (_thinned, _mapped),

@@ -33,7 +33,8 @@ def evaluate_command(
     def watch(steps: list[Any]) -> Any:
         return watched(steps, total=len(steps), what="mapping and judging")
 
-    verdicts = evaluate(log, watch=watch, **read_settings(config)["mapper"])
+    settings = read_settings(config)
+    verdicts = evaluate(log, watch=watch, ground=settings["ground"], **settings["mapper"])
     if plot is not None:
         _draw(verdicts["views"], plot)
     figures = {name: asdict(verdict.figures) for name, verdict in verdicts.items()}
