@@ -147,7 +147,7 @@ def judge(grid: ConfidenceGrid, held_out: HeldOut, trajectory: Floats) -> Tally:
     on_cells = _states_at(window, states, window.cell_to_world(cells))
     return Tally(
         obstacles=len(at_obstacle),
-        near_nonfree=_near_nonfree(window, states, held_out.obstacles).sum(),
+        near_nonfree=near_nonfree(window, states, held_out.obstacles).sum(),
         in_free=(at_obstacle == CellState.FREE).sum(),
         obstacles_unknown=_not_known(at_obstacle).sum(),
         grounds=len(at_ground),
@@ -199,7 +199,8 @@ def cells_around(
     return cells, distance
 
 
-def _near_nonfree(window: GridWindow, states: Bytes, points: Floats) -> Bools:
+def near_nonfree(window: GridWindow, states: Bytes, points: Floats) -> Bools:
+    """Return which points, shape (n, 2) [m, map], have a non-free cell within 0.3 m."""
     cells, distance = cells_around(window, points, NEAR)
     inside = window.contains(cells)
     nonfree = np.zeros(inside.shape, dtype=np.bool_)

@@ -1,0 +1,20 @@
+"""Worlds that are known, and a stereo sensor that sees them: the ground truth that logs lack."""
+
+from groundmap.simulate.drive import Drive, DriveSettings, drive
+from groundmap.simulate.landmarks import Landmarks, strew
+from groundmap.simulate.observe import observe
+from groundmap.simulate.sensor import SensorSettings
+from groundmap.simulate.world import Hole, Solid, World
+
+__all__ = [
+    "Drive",
+    "DriveSettings",
+    "Hole",
+    "Landmarks",
+    "SensorSettings",
+    "Solid",
+    "World",
+    "drive",
+    "observe",
+    "strew",
+]

@@ -1,0 +1,97 @@
+"""A drive: the poses that views are taken from, and how wrong the log has them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field
+
+from groundmap.arrays import Floats, as_floats, check_finite
+from groundmap.settings import Settings
+
+
+class DriveSettings(Settings):
+    """Where the robot goes, and how well the log knows it."""
+
+    stops: tuple[tuple[float, float, float], ...] = Field(
+        min_length=1, description="x, y [m, map] and yaw [deg]; it turns where only yaw changes"
+    )
+    every: float = Field(1.0, gt=0, description="it takes a view at least this often [m]")
+    every_turn: float = Field(0.5, gt=0, description="and at least this often in turns [rad]")
+    seconds_per_view: float = Field(1.0, gt=0, description="time between views [s]")
+    position_noise: float = Field(
+        0.0, ge=0, description="standard deviation of each pose's x and y [m]"
+    )
+    yaw_noise: float = Field(0.0, ge=0, description="standard deviation of each pose's yaw [rad]")
+    drift: float = Field(0.0, description="scale by which the log overstates the way driven")
+    yaw_drift: float = Field(0.0, description="turn of the log per way driven [rad/m]")
+
+
+class Drive(NamedTuple):
+    """Poses of ``base_link``, shape (n, 4, 4) [map]."""
+
+    true: Floats
+    logged: Floats  #: as the log has them
+    times: Floats  #: shape (n,) [s]
+
+
+def drive(settings: DriveSettings, rng: np.random.Generator) -> Drive:
+    """Return the poses of a drive from stop to stop, straight and at a steady pace.
+
+    Examples
+    --------
+    >>> settings = DriveSettings(stops=((0, 0, 0), (3, 0, 0), (3, 0, 90)))
+    >>> len(drive(settings, np.random.default_rng(1)).times)
+    8
+    """
+    poses = _along(settings)
+    logged = _drifted(poses, settings)
+    noise = rng.normal(size=poses.shape)
+    logged += noise * (settings.position_noise, settings.position_noise, settings.yaw_noise)
+    times = settings.seconds_per_view * np.arange(len(poses), dtype=np.float64)
+    return Drive(to_transforms(poses), to_transforms(logged), times)
+
+
+def to_transforms(poses: npt.ArrayLike) -> Floats:
+    """Return transforms, shape (n, 4, 4), of poses on the ground: x, y [m] and yaw [rad]."""
+    rows = as_floats("poses", poses, (None, 3))
+    check_finite("poses", rows)
+    x, y, yaw = rows.T
+    transforms = np.tile(np.eye(4), (len(x), 1, 1))
+    transforms[:, 0, 0], transforms[:, 0, 1] = np.cos(yaw), -np.sin(yaw)
+    transforms[:, 1, 0], transforms[:, 1, 1] = np.sin(yaw), np.cos(yaw)
+    transforms[:, 0, 3], transforms[:, 1, 3] = x, y
+    return transforms
+
+
+def _along(settings: DriveSettings) -> Floats:
+    """Return x, y [m] and yaw [rad] of each view."""
+    stops = as_floats("stops", settings.stops, (None, 3))
+    check_finite("stops", stops)
+    stops = np.column_stack([stops[:, :2], np.unwrap(np.radians(stops[:, 2]))])
+    moves = np.diff(stops, axis=0)
+    lengths = np.hypot(moves[:, 0], moves[:, 1]) / settings.every
+    turns = np.abs(moves[:, 2]) / settings.every_turn
+    counts = np.maximum(np.ceil(np.maximum(lengths, turns)).astype(int), 1)
+    steps = [
+        stop + np.outer(np.arange(count) / count, move)
+        for stop, count, move in zip(stops[:-1], counts, moves, strict=True)
+    ]
+    return np.concatenate([*steps, stops[-1:]])
+
+
+def _drifted(poses: Floats, settings: DriveSettings) -> Floats:
+    """Chain the moves anew, each stretched and turned: what odometry does."""
+    moves = np.diff(poses, axis=0)
+    driven = np.cumsum([0.0, *np.hypot(moves[:, 0], moves[:, 1])])
+    turn = settings.yaw_drift * driven
+    cos, sin = np.cos(turn[:-1]), np.sin(turn[:-1])
+    turned = np.column_stack(
+        [cos * moves[:, 0] - sin * moves[:, 1], sin * moves[:, 0] + cos * moves[:, 1]]
+    )
+    places = poses[0, :2] + np.cumsum(
+        np.vstack([np.zeros((1, 2)), (1.0 + settings.drift) * turned]), axis=0
+    )
+    return np.column_stack([places, poses[:, 2] + turn])

@@ -1,0 +1,198 @@
+"""Landmarks: what a matcher could find in a world, strewn over its surfaces, edges and ground."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from groundmap.arrays import Bools, Floats, Ints
+from groundmap.simulate.occlusion import edges_of
+from groundmap.simulate.world import Hole, Solid, World
+
+GROUND = -1  # the owner of what belongs to no solid
+OFF = 1e-6  # [m], landmarks stand off their surface, so that it doesn't hide them
+SHORTEST, LONGEST = 0.3, 1.2  # [m], of a segment
+
+
+class Marks(NamedTuple):
+    """Landmarks of one kind, where they are at time 0."""
+
+    xyz: Floats  #: shape (n, 3) [m, map] of points, (n, 2, 3) of segments
+    owner: Ints  #: shape (n,), the solid that carries it; -1 for the ground and its holes
+
+    def __len__(self) -> int:
+        return len(self.owner)
+
+
+class Landmarks(NamedTuple):
+    """All landmarks of a world."""
+
+    points: Marks
+    segments: Marks
+
+
+class _Face(NamedTuple):
+    """An upright rectangle: a corner and two sides, all shape (3,) [m, map]."""
+
+    corner: Floats
+    along: Floats
+    up: Floats
+
+    @property
+    def area(self) -> float:
+        return float(np.linalg.norm(self.along) * np.linalg.norm(self.up))
+
+
+def strew(world: World, rng: np.random.Generator) -> Landmarks:
+    """Strew landmarks over a world, as densely as its solids and its ground say.
+
+    Points fall on upright faces, on tops and on the ground, at random; segments likewise, and
+    along the upper and upright edges of the solids that have `edges`, in pieces of 1.2 m at most.
+
+    Parameters
+    ----------
+    world : World
+        The moving and the passing are strewn, too: `present_at` tells who is there.
+    rng : numpy Generator
+
+    Examples
+    --------
+    >>> world = World(bounds=(0, 0, 10, 10), solids=(Solid(shapely.box(4, 4, 5, 5), top=1.0),))
+    >>> found = strew(world, np.random.default_rng(1))
+    >>> len(found.points), len(found.segments)
+    (641, 8)
+    """
+    points, segments = [_on_ground(world, rng)], [_lines_on_ground(world, rng)]
+    for solid in world.solids:
+        points.append(np.concatenate([_on_faces(solid, rng), _on_top(solid, rng)]))
+        segments.append(np.concatenate([_lines_on_faces(solid, rng), _edges(solid)]))
+    return Landmarks(_marks(points), _marks(segments))
+
+
+def _marks(parts: list[Floats]) -> Marks:
+    """Join the landmarks of the ground, which come first, and of each solid."""
+    owners = np.repeat(np.arange(len(parts)) + GROUND, [len(part) for part in parts])
+    return Marks(np.concatenate(parts), owners)
+
+
+def present_at(marks: Marks, world: World, time: float) -> tuple[Floats, Bools]:
+    """Return where landmarks are at a time [s], and which of them are there."""
+    shifts = np.array([(0.0, 0.0), *(solid.shift(time) for solid in world.solids)])
+    there = np.array([True, *(solid.is_there(time) for solid in world.solids)])
+    row = marks.owner + 1  # the ground comes first
+    xyz = marks.xyz.copy()
+    xyz[..., :2] += shifts[row].reshape(-1, *(1,) * (xyz.ndim - 2), 2)
+    return xyz, there[row]
+
+
+def _on_ground(world: World, rng: np.random.Generator) -> Floats:
+    count = rng.poisson(world.ground_texture * _ground_area(world))
+    places = _in_bounds(world, count, rng)
+    points = np.column_stack([places, np.zeros(count)])
+    walls = []
+    for hole in world.holes:
+        points[shapely.contains_xy(hole.outline, places), 2] = -hole.depth
+        walls += [_spots(face, world.ground_texture, rng) for face in _hole_faces(hole)]
+    return np.concatenate([points, *walls])
+
+
+def _hole_faces(hole: Hole) -> Iterator[_Face]:
+    """Yield the walls of a hole, which face inwards."""
+    for edge in edges_of(hole.outline):
+        along = np.array([*(edge[2:] - edge[:2]), 0.0])
+        inwards = OFF * np.array([-along[1], along[0], 0.0]) / np.linalg.norm(along)
+        corner = np.array([*edge[:2], -hole.depth]) + inwards
+        yield _Face(corner, along, np.array([0.0, 0.0, hole.depth]))
+
+
+def _lines_on_ground(world: World, rng: np.random.Generator) -> Floats:
+    count = rng.poisson(world.ground_lines * _ground_area(world))
+    middle, turn = _in_bounds(world, count, rng), rng.uniform(0.0, np.pi, count)
+    half = 0.5 * rng.uniform(SHORTEST, LONGEST, count)[:, None]
+    way = half * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    ends = np.zeros((count, 2, 3))
+    ends[:, :, :2] = np.stack([middle - way, middle + way], axis=1)
+    holes = shapely.union_all([hole.outline for hole in world.holes])
+    off_holes: Floats = ends[~shapely.intersects(shapely.linestrings(ends[:, :, :2]), holes)]
+    return off_holes
+
+
+def _ground_area(world: World) -> float:
+    xmin, ymin, xmax, ymax = world.bounds
+    return (xmax - xmin) * (ymax - ymin)
+
+
+def _in_bounds(world: World, count: int, rng: np.random.Generator) -> Floats:
+    xmin, ymin, xmax, ymax = world.bounds
+    return rng.uniform((xmin, ymin), (xmax, ymax), (count, 2))
+
+
+def _faces(solid: Solid) -> Iterator[_Face]:
+    """Yield the upright faces of a solid, a hair in front of it.
+
+    The exterior runs counter-clockwise and holes clockwise: outside is always to the right.
+    """
+    up = np.array([0.0, 0.0, solid.top - solid.bottom])
+    for edge in edges_of(solid.outline):
+        along = np.array([*(edge[2:] - edge[:2]), 0.0])
+        outwards = OFF * np.array([along[1], -along[0], 0.0]) / np.linalg.norm(along)
+        yield _Face(np.array([*edge[:2], solid.bottom]) + outwards, along, up)
+
+
+def _on_faces(solid: Solid, rng: np.random.Generator) -> Floats:
+    spots = [_spots(face, solid.texture, rng) for face in _faces(solid)]
+    return np.concatenate([np.empty((0, 3)), *spots])
+
+
+def _spots(face: _Face, density: float, rng: np.random.Generator) -> Floats:
+    shares = rng.random((rng.poisson(density * face.area), 2))
+    spots: Floats = face.corner + shares @ np.stack([face.along, face.up])
+    return spots
+
+
+def _on_top(solid: Solid, rng: np.random.Generator) -> Floats:
+    xmin, ymin, xmax, ymax = solid.outline.bounds
+    count = rng.poisson(solid.texture * (xmax - xmin) * (ymax - ymin))
+    places = rng.uniform((xmin, ymin), (xmax, ymax), (count, 2))
+    on_it = places[shapely.contains_xy(solid.outline, places)]
+    return np.column_stack([on_it, np.full(len(on_it), solid.top + OFF)])
+
+
+def _lines_on_faces(solid: Solid, rng: np.random.Generator) -> Floats:
+    strokes = [np.empty((0, 2, 3))]
+    for face in _faces(solid):
+        strokes += [
+            _strokes(face.corner, face.along, face.up, solid.lines * face.area, rng),
+            _strokes(face.corner, face.up, face.along, solid.lines * face.area, rng),
+        ]
+    return np.concatenate(strokes)
+
+
+def _strokes(
+    corner: Floats, way: Floats, across: Floats, mean: float, rng: np.random.Generator
+) -> Floats:
+    """Strew segments that run along `way` over a face."""
+    count = rng.poisson(mean)
+    length = rng.uniform(SHORTEST, LONGEST, count)
+    share = np.minimum(length / np.linalg.norm(way), 1.0)
+    begin = corner + np.outer(rng.random(count) * (1.0 - share), way)
+    begin += np.outer(rng.random(count), across)
+    return np.stack([begin, begin + np.outer(share, way)], axis=1)
+
+
+def _edges(solid: Solid) -> Floats:
+    """Return the upper and the upright edges of a solid, cut into pieces of one length."""
+    if not solid.edges:
+        return np.empty((0, 2, 3))
+    ways = [(face.corner + face.up, face.along) for face in _faces(solid)]
+    ways += [(face.corner, face.up) for face in _faces(solid)]
+    return np.concatenate([_cut(start, way) for start, way in ways])
+
+
+def _cut(start: Floats, way: Floats) -> Floats:
+    count = int(np.ceil(np.linalg.norm(way) / LONGEST))
+    cuts = start + np.outer(np.arange(count + 1) / count, way)
+    return np.stack([cuts[:-1], cuts[1:]], axis=1)

@@ -1,0 +1,136 @@
+"""Observing a world: the views of a drive, as the log of a stereo sensor would have them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from groundmap.arrays import Bools, Floats, Ints
+from groundmap.features import View
+from groundmap.simulate.drive import Drive
+from groundmap.simulate.landmarks import Landmarks, Marks, present_at
+from groundmap.simulate.matching import broken, match
+from groundmap.simulate.occlusion import in_sight
+from groundmap.simulate.sensor import SensorSettings
+from groundmap.simulate.world import World
+
+PLACES = 9  # along a segment that are looked at, to find the piece of it in sight
+
+
+class _Seen(NamedTuple):
+    """Landmarks of one kind, or pieces of them, that are in sight."""
+
+    pixels: Floats  # (n, ends, 3) [px], true
+    ids: Ints  # (n,), rows of the landmarks
+
+
+def observe(
+    world: World, landmarks: Landmarks, moves: Drive, settings: SensorSettings, *, seed: int
+) -> Iterator[View]:
+    """Yield the views of a drive, one per pose, with the poses that the log has.
+
+    Parameters
+    ----------
+    world : World
+    landmarks : Landmarks
+        From `groundmap.simulate.landmarks.strew`.
+    moves : Drive
+    settings : SensorSettings
+    seed : int
+        Each view has random numbers of its own, so that views don't depend on each other.
+
+    Notes
+    -----
+    Landmark ids are the rows of the landmarks, points first.
+    """
+    for number, (pose, logged, time) in enumerate(zip(*moves, strict=True)):
+        rng = np.random.default_rng((seed, number))
+        scene = _Scene(world, pose, time, settings)
+        points = _some_of(scene.points(landmarks.points), settings.max_points, rng)
+        matched, found = match(
+            points.pixels, scene.periods(points, landmarks.points), settings, rng
+        )
+        strokes = _some_of(scene.segments(landmarks.segments), settings.max_segments, rng)
+        lines, lines_found = match(
+            strokes.pixels, scene.periods(strokes, landmarks.segments), settings, rng
+        )
+        pieces, row = broken(lines[lines_found], settings, rng)
+        yield View.from_pixels(
+            logged,
+            settings.rig,
+            points_px=matched[found, 0],
+            point_ids=points.ids[found],
+            segments_px=pieces,
+            segment_ids=strokes.ids[lines_found][row] + len(landmarks.points),
+            timestamp=time,
+        )
+
+
+class _Scene:
+    """The world from one pose at one time."""
+
+    def __init__(self, world: World, pose: Floats, time: float, settings: SensorSettings) -> None:
+        self.world, self.pose, self.time, self.settings = world, pose, time, settings
+        self.now = world.at(time)
+        self.eye = (pose @ settings.rig.T_base_camera)[:3, 3]
+
+    def points(self, marks: Marks) -> _Seen:
+        """Return the point landmarks in sight."""
+        xyz, there = present_at(marks, self.world, self.time)
+        pixels, seen = self._look(xyz, there)
+        ids = np.flatnonzero(seen)
+        return _Seen(pixels[ids, None], ids)
+
+    def segments(self, marks: Marks) -> _Seen:
+        """Return the segment landmarks in sight: of each, its longest piece that is."""
+        xyz, there = present_at(marks, self.world, self.time)
+        share = np.linspace(0.0, 1.0, PLACES)[:, None]
+        places = xyz[:, :1] * (1.0 - share) + xyz[:, 1:] * share
+        _, seen = self._look(places.reshape(-1, 3), np.repeat(there, PLACES))
+        start, length = _longest_runs(seen.reshape(-1, PLACES))
+        ids = np.flatnonzero(length > 1)
+        ends = np.stack([start[ids], start[ids] + length[ids] - 1], axis=1)
+        visible = places[ids[:, None], ends]
+        pixels, _ = self.settings.project(self.pose, visible.reshape(-1, 3))
+        return _Seen(pixels.reshape(-1, 2, 3), ids)
+
+    def periods(self, seen: _Seen, marks: Marks) -> Floats:
+        """Return how far apart the pieces of repeated patterns are in the images, (n,) [px].
+
+        As if the pattern were seen face on; 0 where there is none.
+        """
+        repeats = np.array([0.0, *(solid.repeat for solid in self.world.solids)])
+        disparity_px = (seen.pixels[..., 0] - seen.pixels[..., 1]).mean(axis=1)
+        periods: Floats = (
+            repeats[marks.owner[seen.ids] + 1] * disparity_px / self.settings.baseline
+        )
+        return periods
+
+    def _look(self, places: Floats, there: Bools) -> tuple[Floats, Bools]:
+        """Return the pixels of places and which of them are in both images, with nothing before."""
+        pixels, seen = self.settings.project(self.pose, places)
+        rows = np.flatnonzero(seen & there)
+        seen[:] = False
+        seen[rows] = in_sight(self.now, self.eye, places[rows])
+        return pixels, seen
+
+
+def _some_of(seen: _Seen, most: int, rng: np.random.Generator) -> _Seen:
+    if len(seen.ids) <= most:
+        return seen
+    rows = np.sort(rng.permutation(len(seen.ids))[:most])
+    return _Seen(seen.pixels[rows], seen.ids[rows])
+
+
+def _longest_runs(seen: Bools) -> tuple[Ints, Ints]:
+    """Return start and length of the longest run of True in each row; of length 0 for none."""
+    run = np.zeros(len(seen), dtype=np.int64)
+    best, start = np.zeros_like(run), np.zeros_like(run)
+    for place in range(seen.shape[1]):
+        run = np.where(seen[:, place], run + 1, 0)
+        longer = run > best
+        best = np.where(longer, run, best)
+        start = np.where(longer, place - run + 1, start)
+    return start, best

@@ -1,0 +1,92 @@
+"""Who sees what in a world at one moment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from groundmap.arrays import Bools, Floats, Ints
+from groundmap.kernels.occlusion import hidden
+from groundmap.simulate.world import Hole, World
+
+GROUND_LEVEL = 0.0  # [m], where sight along the ground runs
+
+
+class Prisms(NamedTuple):
+    """Footprints with heights as the kernels read them."""
+
+    edges: Floats  #: shape (e, 4) [m, map], x0, y0, x1, y1
+    starts: Ints  #: shape (p + 1,), first edge of each prism
+    heights: Floats  #: shape (p, 2) [m], bottom and top
+
+
+def opaque_prisms(world: World) -> Prisms:
+    """Return all that hides: every solid but glass. The world is at rest, as `World.at` gives it.
+
+    Examples
+    --------
+    >>> from groundmap.simulate.world import Solid
+    >>> world = World(bounds=(0, 0, 9, 9), solids=(Solid(shapely.box(4, 4, 5, 5), top=1.0),))
+    >>> in_sight(world, np.array([1.0, 4.5, 2.0]), np.array([(8.0, 4.5, 0.0), (8.0, 4.5, 1.5)]))
+    array([False,  True])
+    """
+    solids = [solid for solid in world.solids if not solid.transparent]
+    return _prisms(
+        [solid.outline for solid in solids], [(solid.bottom, solid.top) for solid in solids]
+    )
+
+
+def ground_level_prisms(obstacles: shapely.Geometry) -> Prisms:
+    """Return what ends sight along the ground, whatever its height, from `World.obstacles`."""
+    outlines = list(shapely.get_parts(obstacles))
+    return _prisms(outlines, [(GROUND_LEVEL - 1.0, GROUND_LEVEL + 1.0)] * len(outlines))
+
+
+def edges_of(outline: shapely.Geometry) -> Floats:
+    """Return the edges of all rings of one polygon or several, shape (e, 4): x0, y0, x1, y1."""
+    rings = shapely.get_rings(shapely.get_parts(outline))
+    corners = [shapely.get_coordinates(ring) for ring in rings]
+    pieces = [np.hstack([ring[:-1], ring[1:]]) for ring in corners]
+    return np.concatenate([np.empty((0, 4)), *pieces])
+
+
+def unhidden(prisms: Prisms, eye: Floats, targets: Floats) -> Bools:
+    """Return which targets, shape (n, 3) [m, map], no prism hides from the eye."""
+    out = np.empty(len(targets), dtype=np.bool_)
+    hidden(np.ascontiguousarray(eye), np.ascontiguousarray(targets), *prisms, out)
+    return ~out
+
+
+def in_sight(world: World, eye: Floats, targets: Floats) -> Bools:
+    """Return which targets, shape (n, 3) [m, map], can be seen from the eye, shape (3,).
+
+    The world is at rest. Targets below the ground are seen through the mouth of their hole.
+    """
+    seen = unhidden(opaque_prisms(world), eye, targets)
+    below = np.flatnonzero(seen & (targets[:, 2] < 0))
+    seen[below] = _through_mouths(world.holes, eye, targets[below])
+    return seen
+
+
+def _through_mouths(holes: Iterable[Hole], eye: Floats, targets: Floats) -> Bools:
+    """Return which targets below the ground have nothing but a hole above their line of sight."""
+    share = eye[2] / (eye[2] - targets[:, 2])  # where sight passes the ground's level
+    entry = eye[:2] + share[:, None] * (targets[:, :2] - eye[:2])
+    lines = shapely.linestrings(np.stack([entry, targets[:, :2]], axis=1))
+    seen = np.zeros(len(targets), dtype=np.bool_)
+    for hole in holes:
+        seen |= shapely.covers(hole.outline, lines)
+    return seen
+
+
+def _prisms(outlines: list[shapely.Polygon], heights: list[tuple[float, float]]) -> Prisms:
+    pieces = [edges_of(outline) for outline in outlines]
+    counts = [0, *(len(piece) for piece in pieces)]
+    return Prisms(
+        np.concatenate([np.empty((0, 4)), *pieces]),
+        np.cumsum(counts, dtype=np.int64),
+        np.array(heights, dtype=np.float64).reshape(-1, 2),
+    )

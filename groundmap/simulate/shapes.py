@@ -1,0 +1,77 @@
+"""Outlines and solids by the words that a scenario file uses: box, wall, pole, table."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+from groundmap.arrays import as_floats
+from groundmap.errors import InputError
+from groundmap.simulate.world import Solid
+
+POLE_SIDES = 12
+LEG, SLAB = 0.06, 0.05  # [m], of a table
+
+
+def box(x0: float, y0: float, x1: float, y1: float) -> shapely.Polygon:
+    """Return an upright rectangle from two opposite corners [m].
+
+    Raises
+    ------
+    InputError
+        Corners that do not differ in both coordinates.
+    """
+    if x0 == x1 or y0 == y1:
+        raise InputError("box", "two opposite corners [m]", f"{(x0, y0, x1, y1)}")
+    return shapely.box(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
+
+
+def wall(points: npt.ArrayLike, *, thickness: float = 0.2) -> shapely.Polygon:
+    """Return a wall along a polyline, shape (n, 2) [m], which is its centre line.
+
+    Examples
+    --------
+    >>> wall([(0, 0), (5, 0), (5, 3)], thickness=0.2).bounds
+    (0.0, -0.1, 5.1, 3.0)
+    """
+    line = shapely.LineString(as_floats("wall", points, (None, 2)))
+    outline: shapely.Polygon = line.buffer(
+        thickness / 2.0, cap_style="flat", join_style="mitre", single_sided=False
+    )
+    return outline
+
+
+def pole(x: float, y: float, *, radius: float = 0.06) -> shapely.Polygon:
+    """Return a regular polygon of twelve corners around a place [m]; `radius` is to its corners."""
+    turns = 2.0 * np.pi * np.arange(POLE_SIDES) / POLE_SIDES
+    return shapely.Polygon(
+        np.column_stack([x + radius * np.cos(turns), y + radius * np.sin(turns)])
+    )
+
+
+def table(
+    x0: float, y0: float, x1: float, y1: float, *, height: float = 0.75, **options: Any
+) -> tuple[Solid, ...]:
+    """Return a table: a thin top on four legs, which it juts out over by 0.15 m.
+
+    Parameters
+    ----------
+    x0, y0, x1, y1 : float [m]
+        Two opposite corners of its top.
+    height : float [m]
+    **options
+        Other parameters of the solids, such as ``texture``.
+    """
+    top = box(x0, y0, x1, y1)
+    xmin, ymin, xmax, ymax = top.bounds
+    inset = 0.15 + LEG / 2.0
+    legs = tuple(
+        Solid(shapely.box(x - LEG / 2, y - LEG / 2, x + LEG / 2, y + LEG / 2),
+              top=height - SLAB, **options)
+        for x in (xmin + inset, xmax - inset)
+        for y in (ymin + inset, ymax - inset)
+    )  # fmt: skip
+    return (Solid(top, bottom=height - SLAB, top=height, **options), *legs)

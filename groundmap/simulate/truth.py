@@ -1,0 +1,194 @@
+"""The truth about a world, cell by cell: what is free, and what could be seen of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from scipy.ndimage import binary_dilation
+
+from groundmap.arrays import Bools, Floats
+from groundmap.settings import MapperSettings
+from groundmap.simulate.drive import Drive
+from groundmap.simulate.occlusion import (
+    GROUND_LEVEL,
+    Prisms,
+    edges_of,
+    ground_level_prisms,
+    unhidden,
+)
+from groundmap.simulate.sensor import SensorSettings
+from groundmap.simulate.world import World
+from groundmap.window import GridWindow, cells_of, centres_of
+
+HAIR = 1e-6  # [m], surfaces are looked at from this far before them; a cell touched by less is free
+SAME_PLACE = 1e-3  # [m], a surface seen this near to where one is at the end was that one
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """What a map of a world should say, on the cells of a window.
+
+    Attributes
+    ----------
+    obstacles : shapely.Geometry [m, map]
+        Where the robot can't be at the end of the drive.
+    nonfree : ndarray of bool, shape (rows, cols)
+        Cells that an obstacle reaches into.
+    visible : ndarray of bool, shape (rows, cols)
+        Cells whose centre some view saw along the ground: in both images, in range, with nothing
+        but free ground between.
+    in_line : ndarray of bool, shape (rows, cols)
+        The same for a camera that looks all around and without end. Free cells of a map outside
+        of it lie behind a surface or in it: the dangerous mistake.
+    surfaces : ndarray, shape (n, 2) [m, map]
+        Places along the obstacles' outlines that some view saw, half a cell apart.
+    viewpoints : ndarray, shape (v, 2) [m, map]
+    """
+
+    obstacles: shapely.Geometry
+    nonfree: Bools
+    visible: Bools
+    in_line: Bools
+    surfaces: Floats
+    viewpoints: Floats
+
+
+def truth_of(
+    world: World,
+    moves: Drive,
+    sensor: SensorSettings,
+    window: GridWindow,
+    settings: MapperSettings,
+) -> Truth:
+    """Return the truth about a world, as far as a drive could show it.
+
+    Parameters
+    ----------
+    world : World
+    moves : Drive
+    sensor : SensorSettings
+    window : GridWindow
+        The cells to speak of.
+    settings : MapperSettings
+        What is an obstacle, and how far the map reaches: ``step_height``, ``robot_height``,
+        ``max_range``.
+    """
+    heights = settings.step_height, settings.robot_height
+    at_end = world.at(float(moves.times[-1])).obstacles(*heights)
+    samples = _along_outlines(at_end, 0.5 * window.resolution)
+    shape = window.count.shape
+    centres = window.cell_to_world(np.argwhere(np.ones(shape, dtype=np.bool_)))
+    sight = _Sight(centres, samples)
+    reach = min(sensor.max_range, settings.max_range)
+    eyes = moves.true @ sensor.rig.T_base_camera
+    for T_map_camera, time in zip(eyes, moves.times, strict=True):
+        now = world.at(float(time))
+        prisms = ground_level_prisms(now.obstacles(*heights, opaque=True))
+        sight.look(prisms, T_map_camera, sensor, reach, _still_there(samples, now, heights))
+    return Truth(
+        obstacles=at_end,
+        nonfree=touched_cells(at_end, window.origin, window.resolution, shape),
+        visible=sight.visible.reshape(shape),
+        in_line=sight.in_line.reshape(shape),
+        surfaces=samples[sight.surfaces_seen],
+        viewpoints=eyes[:, :2, 3],
+    )
+
+
+class _Sight:
+    """What has been seen so far, view after view; what has been is not looked at again."""
+
+    def __init__(self, centres: Floats, samples: Floats) -> None:
+        self.centres, self.samples = centres, samples
+        self.visible = np.zeros(len(centres), dtype=np.bool_)
+        self.in_line = np.zeros(len(centres), dtype=np.bool_)
+        self.surfaces_seen = np.zeros(len(samples), dtype=np.bool_)
+
+    def look(
+        self, prisms: Prisms, T_map_camera: Floats, sensor: SensorSettings, reach: float,
+        there: Bools,
+    ) -> None:  # fmt: skip
+        """Add one view; `there` tells which samples are on a surface now."""
+        eye = T_map_camera[:2, 3]
+        ahead = in_images(self.centres, T_map_camera, sensor, reach) & ~self.visible
+        self.visible |= _clear(prisms, eye, self.centres, ahead)
+        self.in_line |= self.visible
+        self.in_line |= _clear(prisms, eye, self.centres, ~self.in_line)
+        ahead = in_images(self.samples, T_map_camera, sensor, reach) & ~self.surfaces_seen
+        self.surfaces_seen |= _clear(prisms, eye, self.samples, ahead & there)
+
+
+def in_images(places: Floats, T_map_camera: Floats, sensor: SensorSettings, reach: float) -> Bools:
+    """Return which places, shape (n, 2), have columns in both images, be it above or below them."""
+    axis = T_map_camera[:2, 2] / np.hypot(*T_map_camera[:2, 2])
+    away = places - T_map_camera[:2, 3]
+    depth, left = away @ axis, away @ np.array([-axis[1], axis[0]])
+    rig = sensor.rig
+    with np.errstate(divide="ignore", invalid="ignore"):
+        column = rig.cx - rig.fx * left / depth
+        other = column - rig.fx * rig.baseline / depth
+    near = np.hypot(away[:, 0], away[:, 1]) <= reach
+    inside: Bools = (depth > 0) & near & (other >= 0) & (column <= sensor.width_px)
+    return inside
+
+
+def seen_along_ground(
+    obstacles: shapely.Geometry, places: Floats, T_map_camera: Floats, sensor: SensorSettings
+) -> Bools:
+    """Return which places on the ground, shape (n, 2), one view sees, in the sensor's range."""
+    ahead = in_images(places, T_map_camera, sensor, sensor.max_range)
+    return _clear(ground_level_prisms(obstacles), T_map_camera[:2, 3], places, ahead)
+
+
+def _clear(prisms: Prisms, eye: Floats, places: Floats, rows: Bools) -> Bools:
+    """Return which places among `rows` nothing hides, along the ground."""
+    clear = np.zeros(len(places), dtype=np.bool_)
+    targets = np.column_stack([places[rows], np.full(rows.sum(), GROUND_LEVEL)])
+    clear[rows] = unhidden(prisms, np.array([*eye, GROUND_LEVEL]), targets)
+    return clear
+
+
+def _still_there(samples: Floats, now: World, heights: tuple[float, float]) -> Bools:
+    """Return which samples of the obstacles at the end lie on an outline now."""
+    outlines = now.obstacles(*heights).boundary
+    shapely.prepare(outlines)
+    there: Bools = shapely.dwithin(shapely.points(samples), outlines, SAME_PLACE)
+    return there
+
+
+def _along_outlines(obstacles: shapely.Geometry, step: float) -> Floats:
+    """Return places a hair before all edges, `step` apart at most, shape (n, 2) [m]."""
+    pieces = [np.empty((0, 2))]
+    for edge in edges_of(shapely.orient_polygons(obstacles)):
+        start, along = edge[:2], edge[2:] - edge[:2]
+        length = float(np.hypot(*along))
+        count = int(np.ceil(length / step))
+        outwards = HAIR * np.array([along[1], -along[0]]) / length
+        shares = (np.arange(count) + 0.5) / count
+        pieces.append(start + outwards + shares[:, None] * along)
+    return np.concatenate(pieces)
+
+
+def touched_cells(
+    obstacles: shapely.Geometry, origin: Floats, resolution: float, shape: tuple[int, ...]
+) -> Bools:
+    """Return which cells an obstacle reaches into by more than a hair, (rows, cols).
+
+    Cells far from all outlines are in or out as their centre is; the others are looked at exactly.
+    """
+    shapely.prepare(obstacles)
+    cells = np.argwhere(np.ones(shape, dtype=np.bool_))
+    centres = centres_of(cells, origin, resolution)
+    touched: Bools = shapely.contains_xy(obstacles, centres)
+    on_outline = np.zeros(shape, dtype=np.bool_)
+    samples = cells_of(_along_outlines(obstacles, 0.5 * resolution), origin, resolution)
+    inside = ((samples >= 0) & (samples < shape)).all(axis=1)
+    on_outline[tuple(samples[inside].T)] = True
+    near = np.flatnonzero(binary_dilation(on_outline, structure=np.ones((3, 3))))
+    half = 0.5 * resolution - HAIR
+    x, y = centres[near].T
+    boxes = shapely.box(x - half, y - half, x + half, y + half)
+    touched[near] = shapely.intersects(boxes, obstacles)
+    return touched.reshape(shape)

@@ -1,0 +1,206 @@
+"""A world that is known: prisms on a flat ground, each there for some time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import KW_ONLY, dataclass, replace
+
+import numpy as np
+import shapely
+from shapely.affinity import translate
+
+from groundmap.errors import InputError
+
+ALWAYS = (-math.inf, math.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A prism: a footprint between two heights.
+
+    Parameters
+    ----------
+    outline : shapely.Polygon [m, map]
+        Its footprint, holes allowed.
+    top, bottom : float [m]
+        Heights above the ground; a table top has a bottom above 0.
+    texture : float, default 6 [1/m²]
+        Point features on its sides and its top. 0: a bare wall.
+    lines : float, default 0.4 [1/m²]
+        Segment features on its sides, in each direction.
+    edges : bool, default True
+        Whether its upper and upright edges are matched, as segments.
+    transparent : bool, default False
+        Glass: sight passes through.
+    repeat : float, default 0 [m]
+        Spacing of a pattern that looks the same everywhere, as fences have: what a matcher may
+        mistake one piece for the next of. 0: no such pattern.
+    present : (float, float) [s]
+        From when until when it is there, the latter excluded.
+    velocity : (float, float) [m/s]
+        How it moves; `outline` is where it is at time 0.
+
+    Raises
+    ------
+    InputError
+        An outline that is no valid polygon or has no area, a top that is not above the bottom, a
+        density below 0.
+
+    Examples
+    --------
+    >>> car = Solid(shapely.box(0, 0, 4, 2), top=1.5, velocity=(1.0, 0.0))
+    >>> car.at(3.0).outline.bounds
+    (3.0, 0.0, 7.0, 2.0)
+    """
+
+    outline: shapely.Polygon
+    _: KW_ONLY
+    top: float
+    bottom: float = 0.0
+    texture: float = 6.0
+    lines: float = 0.4
+    edges: bool = True
+    transparent: bool = False
+    repeat: float = 0.0
+    present: tuple[float, float] = ALWAYS
+    velocity: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Check what a prism needs; the outline's exterior is turned counter-clockwise."""
+        object.__setattr__(self, "outline", _polygon("outline", self.outline))
+        if not (math.isfinite(self.top) and math.isfinite(self.bottom) and self.bottom < self.top):
+            raise InputError("top", "a height above the bottom [m]", f"{self.bottom} to {self.top}")
+        for name in ("texture", "lines", "repeat"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0):
+                raise InputError(name, "a number of 0 or more", str(value))
+        if not self.present[0] < self.present[1]:
+            raise InputError("present", "(from, until) [s]", str(self.present))
+
+    def is_there(self, time: float) -> bool:
+        """Return whether it is there at a time [s]."""
+        return self.present[0] <= time < self.present[1]
+
+    def shift(self, time: float) -> tuple[float, float]:
+        """Return how far it has moved at a time [s], x and y [m]."""
+        if self.velocity == (0.0, 0.0):
+            return 0.0, 0.0
+        return self.velocity[0] * time, self.velocity[1] * time
+
+    def at(self, time: float) -> Solid:
+        """Return it where it is at a time [s], at rest."""
+        x, y = self.shift(time)
+        return replace(self, outline=translate(self.outline, x, y), velocity=(0.0, 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Hole:
+    """A piece of ground that lies lower: a pit, a stair downwards.
+
+    Parameters
+    ----------
+    outline : shapely.Polygon [m, map]
+    depth : float [m]
+        How far below the ground its floor lies.
+
+    Raises
+    ------
+    InputError
+        An outline that is no valid polygon or has no area, a depth that is not above 0.
+    """
+
+    outline: shapely.Polygon
+    _: KW_ONLY
+    depth: float
+
+    def __post_init__(self) -> None:
+        """Check the outline and the depth."""
+        object.__setattr__(self, "outline", _polygon("outline", self.outline))
+        if not (math.isfinite(self.depth) and self.depth > 0):
+            raise InputError("depth", "a number above 0 [m]", str(self.depth))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class World:
+    """Solids and holes on a flat ground at height 0.
+
+    Parameters
+    ----------
+    solids : tuple of Solid
+    holes : tuple of Hole
+    bounds : (float, float, float, float) [m, map]
+        xmin, ymin, xmax, ymax of the ground that has texture.
+    ground_texture : float, default 6 [1/m²]
+        Point features on the ground.
+    ground_lines : float, default 0 [1/m²]
+        Segment features on the ground, such as paint.
+
+    Raises
+    ------
+    InputError
+        Bounds that hold nothing, a density below 0.
+
+    Examples
+    --------
+    >>> pillar = Solid(shapely.box(4, 4, 5, 5), top=2.0)
+    >>> table = Solid(shapely.box(6, 4, 8, 5), bottom=0.7, top=0.75)
+    >>> lamp = Solid(shapely.box(1, 1, 2, 2), bottom=2.2, top=2.5)
+    >>> world = World(solids=(pillar, table, lamp), bounds=(0, 0, 10, 10))
+    >>> world.obstacles(0.15, 2.0).area
+    3.0
+    """
+
+    bounds: tuple[float, float, float, float]
+    solids: tuple[Solid, ...] = ()
+    holes: tuple[Hole, ...] = ()
+    ground_texture: float = 6.0
+    ground_lines: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the bounds and the densities."""
+        xmin, ymin, xmax, ymax = self.bounds
+        if not (np.isfinite(self.bounds).all() and xmin < xmax and ymin < ymax):
+            raise InputError("bounds", "XMIN < XMAX and YMIN < YMAX [m]", str(self.bounds))
+        for name in ("ground_texture", "ground_lines"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0):
+                raise InputError(name, "a number of 0 or more [1/m²]", str(value))
+
+    def at(self, time: float) -> World:
+        """Return the world as it stands at a time [s]: what is there, where it is then."""
+        return replace(
+            self, solids=tuple(solid.at(time) for solid in self.solids if solid.is_there(time))
+        )
+
+    def obstacles(
+        self, step_height: float, robot_height: float, *, opaque: bool = False
+    ) -> shapely.Geometry:
+        """Return where a robot can't be: solids it would hit, and holes it would fall into.
+
+        Parameters
+        ----------
+        step_height, robot_height : float [m]
+            Solids between these heights are in the way; holes deeper than the step are.
+        opaque : bool
+            Only what ends the line of sight along the ground: no glass, no holes.
+        """
+        outlines = [
+            solid.outline
+            for solid in self.solids
+            if solid.top > step_height
+            and solid.bottom < robot_height
+            and not (opaque and solid.transparent)
+        ]
+        if not opaque:
+            outlines += [hole.outline for hole in self.holes if hole.depth > step_height]
+        return shapely.union_all(np.array(outlines, dtype=object))
+
+
+def _polygon(name: str, outline: shapely.Polygon) -> shapely.Polygon:
+    if not isinstance(outline, shapely.Polygon):
+        raise InputError(name, "a shapely.Polygon", repr(outline))
+    if not outline.is_valid or outline.area <= 0:
+        raise InputError(
+            name, "a polygon with an area", shapely.is_valid_reason(outline), hint="[m, map]"
+        )
+    return shapely.orient_polygons(outline)

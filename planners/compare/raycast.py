@@ -1,0 +1,82 @@
+"""The ray caster, the usual way from features to a map: what each feature says alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from groundmap import GroundMapper, View
+from groundmap.arrays import Floats, Ints
+from groundmap.evidence import Evidence, drop_off_cells
+from groundmap.grid import ConfidenceGrid
+from groundmap.heights import FlatView, flatten
+from groundmap.settings import MapperSettings
+from planners.kernels.raycast import cast_rays
+
+FREE, NONFREE = np.float32(-1.0), np.float32(1.0)
+
+
+class RayCaster:
+    """Fuses views into a 2-D confidence grid by one thin ray per feature.
+
+    Features are sorted by height as `groundmap.GroundMapper` does, and views are fused by the same
+    rule; only what one view says differs.
+
+    Parameters
+    ----------
+    **settings
+        `groundmap.settings.MapperSettings`; those about links, spread and support do nothing here.
+
+    Raises
+    ------
+    SettingsError
+        An unknown setting (the nearest one is named), or a value out of range.
+    """
+
+    def __init__(self, **settings: Any) -> None:
+        self.settings = MapperSettings(**settings)
+        self.grid = GroundMapper(**settings).grid
+
+    def integrate(self, view: View) -> None:
+        """Add one view to the grid.
+
+        Raises
+        ------
+        NoGroundPlaneError
+            The view has no plane, or its camera looks at the ground or the sky.
+        """
+        flat = flatten(view, self.settings)
+        evidence = rays_of(flat, self.grid)
+        self.grid.fuse(evidence.lower, evidence.z)
+        self.grid.add_drop_offs(drop_off_cells(flat, self.grid))
+
+
+def rays_of(flat: FlatView, grid: ConfidenceGrid) -> Evidence:
+    """Draw the rays of one view into cells: one z per cell, non-free before free.
+
+    The cells from the camera to a feature are free (-1), its own included; that of an obstacle
+    feature is non-free (+1), whatever passes through. Of a segment the two ends count.
+    """
+    origin = _cells(flat, grid, np.zeros((1, 2)))
+    obstacles, grounds = (_cells(flat, grid, xy) for xy in (flat.points, flat.supports))
+    ends = np.concatenate([obstacles, grounds])
+    lower = _floor(np.concatenate([origin, ends])).min(axis=0)
+    upper = _floor(np.concatenate([origin, ends])).max(axis=0)
+    z = np.zeros((upper - lower + 1)[::-1], dtype=np.float32)
+    cast_rays(z, origin[0] - lower, ends - lower, FREE)
+    cols, rows = (_floor(obstacles) - lower).T
+    z[rows, cols] = NONFREE
+    return Evidence(lower[::-1], z)
+
+
+def _cells(flat: FlatView, grid: ConfidenceGrid, xy: Floats) -> Floats:
+    """Carry places over from the frame ``view`` to cells (x along columns), unrounded."""
+    cos, sin = flat.forward
+    to_map = np.array([(cos, -sin), (sin, cos)])
+    cells: Floats = (flat.viewpoint + xy @ to_map.T - grid.origin) / grid.resolution
+    return cells
+
+
+def _floor(cells: Floats) -> Ints:
+    return np.floor(cells).astype(np.int64)

@@ -1,0 +1,182 @@
+"""Why one triangulates: freespace that one view shows, by the number of its features."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import shapely
+from shapely.affinity import rotate
+
+from groundmap import Features, GroundMapper, GroundPlane, View
+from groundmap.arrays import Floats, Ints
+from groundmap.settings import MapperSettings
+from groundmap.simulate import Drive, SensorSettings, Solid, World, observe, strew
+from groundmap.simulate.drive import to_transforms
+from groundmap.simulate.measures import measure
+from groundmap.simulate.truth import Truth, truth_of
+from groundmap.window import GridWindow
+from planners.compare.raycast import RayCaster
+
+POINTS = (50, 100, 150, 200, 300, 600, 900, 1800)  # features in a view
+SEGMENTS = (50, 100, 150, 200, 300)
+WALL = 0.2  # [m], thickness
+WALL_TOP = 2.0  # [m]
+ROOM_FROM_OBSTACLES = 0.5  # [m], around the camera and the way ahead of it
+CLEAR_AHEAD = 3.0  # [m], so that there is something to see
+MARGIN = 1.0  # [m] around a room that is judged, too: nothing there is free
+TEXTURE = 300.0  # [1/m²], so that every view has the most points asked for
+LINES = 20.0  # [1/m²], and segments
+
+
+class Curve(NamedTuple):
+    """What one system makes of one view, by the number of features; means over rooms."""
+
+    counts: Ints  #: shape (n,), features in the view
+    free_recall: Floats  #: shape (n,), of truly free visible cells: free on the map
+    false_free_beyond: Floats  #: shape (n,), of free cells: wrong by more than 0.3 m
+
+
+class Curves(NamedTuple):
+    """The fan with points and with segments, and the ray caster with points."""
+
+    points: Curve
+    segments: Curve
+    rays: Curve
+
+
+class _Scene(NamedTuple):
+    """A room, one view of it with more features than are needed, and the truth."""
+
+    world: World
+    view: View
+    truth: Truth
+
+
+def compare_recall(
+    *,
+    rooms: int = 20,
+    seed: int = 1,
+    pixel_noise_px: float = 0.0,
+    watch: Callable[[list[int]], Iterable[int]] = iter,
+    **settings: Any,
+) -> Curves:
+    """Map single views of random rooms, by triangulation and by ray casting.
+
+    Within a room all maps are made of the same view; fewer features are a part of more, drawn
+    without regard to where they are. Points and segments lie equally densely on walls, boxes and
+    ground. The ray caster is given the points that the fan is given.
+
+    Parameters
+    ----------
+    rooms : int
+    seed : int
+    pixel_noise_px : float [px]
+        Noise of the matcher, which is perfect else.
+    watch : callable
+        Wraps the list of rooms, to show progress.
+    **settings
+        `groundmap.settings.MapperSettings`.
+    """
+    sensor = SensorSettings(
+        pixel_noise_px=pixel_noise_px,
+        missing=0.0,
+        false_matches=0.0,
+        max_points=max(POINTS),
+        max_segments=max(SEGMENTS),
+    )
+    figures = [
+        _figures(_scene(seed, number, sensor, MapperSettings(**settings)), settings)
+        for number in watch(list(range(rooms)))
+    ]
+    points, segments, rays = (np.mean(system, axis=0).T for system in zip(*figures, strict=True))
+    return Curves(
+        Curve(np.array(POINTS), *points),
+        Curve(np.array(SEGMENTS), *segments),
+        Curve(np.array(POINTS), *rays),
+    )
+
+
+def random_room(rng: np.random.Generator) -> World:
+    """Return a room of 8 to 14 m with 4 to 8 boxes in it, 0.5 to 1.8 m high."""
+    size = rng.uniform(8.0, 14.0, 2)
+    inside = shapely.box(0.0, 0.0, *size)
+    walls = inside.buffer(WALL, join_style="mitre").difference(inside)
+    solids = [Solid(walls, top=WALL_TOP, texture=TEXTURE, lines=LINES)]
+    for _ in range(rng.integers(4, 9)):
+        middle, half = rng.uniform((0.0, 0.0), size), rng.uniform(0.2, 0.6, 2)
+        box = rotate(shapely.box(*(middle - half), *(middle + half)), rng.uniform(0.0, 90.0))
+        top = rng.uniform(0.5, 1.8)
+        solids.append(Solid(box.intersection(inside), top=top, texture=TEXTURE, lines=LINES))
+    return World(
+        bounds=inside.bounds,
+        solids=tuple(solids),
+        ground_texture=TEXTURE,
+        ground_lines=LINES,
+    )
+
+
+def _scene(seed: int, number: int, sensor: SensorSettings, settings: MapperSettings) -> _Scene:
+    rng = np.random.default_rng((seed, number))
+    world = random_room(rng)
+    pose = to_transforms([_pose(world, rng)])
+    stop = Drive(pose, pose, np.zeros(1))
+    (view,) = observe(world, strew(world, rng), stop, sensor, seed=int(rng.integers(2**31)))
+    view = replace(
+        view,
+        points=_shuffled(view.points, rng),
+        segments=_shuffled(view.segments, rng),
+        plane=GroundPlane.below_camera(sensor.rig, sensor.camera_height),
+    )
+    window = _judged(GroundMapper(**settings.model_dump()), world)
+    return _Scene(world, view, truth_of(world, stop, sensor, window, settings))
+
+
+def _pose(world: World, rng: np.random.Generator) -> Floats:
+    """Return x, y [m] and yaw [rad] from where there is something to see."""
+    obstacles = world.obstacles(0.0, WALL_TOP).buffer(ROOM_FROM_OBSTACLES)
+    free = shapely.box(*world.bounds).difference(obstacles)
+    while True:
+        place, yaw = rng.uniform(world.bounds[:2], world.bounds[2:]), rng.uniform(-np.pi, np.pi)
+        ahead = place + CLEAR_AHEAD * np.array([np.cos(yaw), np.sin(yaw)])
+        if free.covers(shapely.LineString([place, ahead])):
+            return np.array([*place, yaw])
+
+
+def _shuffled(features: Features, rng: np.random.Generator) -> Features:
+    return features.select(rng.permutation(len(features)))
+
+
+def _figures(scene: _Scene, settings: dict[str, Any]) -> tuple[Floats, Floats, Floats]:
+    """Return the figures of the fan with points and segments, and of the rays, (counts, 2) each."""
+    points = [_only(scene.view, points=count) for count in POINTS]
+    segments = [_only(scene.view, segments=count) for count in SEGMENTS]
+    return (
+        np.array([_judge(GroundMapper(**settings), view, scene) for view in points]),
+        np.array([_judge(GroundMapper(**settings), view, scene) for view in segments]),
+        np.array([_judge(RayCaster(**settings), view, scene) for view in points]),
+    )
+
+
+def _only(view: View, *, points: int = 0, segments: int = 0) -> View:
+    """Return the view with its first features only."""
+    return replace(
+        view,
+        points=view.points.select(np.arange(points)),
+        segments=view.segments.select(np.arange(segments)),
+    )
+
+
+def _judge(mapper: GroundMapper | RayCaster, view: View, scene: _Scene) -> tuple[float, float]:
+    mapper.integrate(view)
+    measures = measure(_judged(mapper, scene.world), scene.truth)
+    # A map without a free cell has none that is wrong.
+    return measures.free_recall or 0.0, measures.false_free_beyond or 0.0
+
+
+def _judged(mapper: GroundMapper | RayCaster, world: World) -> GridWindow:
+    """Return the cells of a map that are judged."""
+    bounds = np.array(world.bounds) + np.array([-MARGIN, -MARGIN, MARGIN, MARGIN])
+    return mapper.grid.window(bounds)

@@ -1,0 +1,1 @@
+"""Scenarios: worlds that are known, what is mapped of them, and the bounds that it must keep."""

@@ -1,0 +1,180 @@
+"""A scenario as its file has it: a world or a log, what is mapped of it, what it must keep."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import Field
+
+from groundmap.errors import FileFormatError, InputError
+from groundmap.settings import GroundSettings, MapperSettings, Settings
+from groundmap.simulate.drive import DriveSettings
+from groundmap.simulate.parts import HoleSettings, SolidSettings
+from groundmap.simulate.scan import ScanSettings
+from groundmap.simulate.sensor import SensorSettings
+from groundmap.simulate.worlds import GENERATORS, WorldGenerator
+from planners.scenario.outcome import Bound
+
+FILE = "scenario.toml"
+TABLES = ("world", "log", "sensor", "scan", "drive", "mapper", "ground", "queries", "bounds")
+S = TypeVar("S", bound=Settings)
+
+
+class QuerySettings(Settings):
+    """A route to be asked for, and what is expected of it."""
+
+    name: str = Field(description="what figures of it are called after")
+    start: tuple[float, ...] = Field(description="x, y [m, map] and optionally yaw [rad]")
+    goal: tuple[float, ...] = Field(description="x, y [m, map] and optionally yaw [rad]")
+    footprint: float = Field(ge=0, description="radius to plan with [m]")
+    robot_radius: float | None = Field(
+        None, ge=0, description="what must not touch the true world; the footprint unless told [m]"
+    )
+    expect: str = Field("route", description="'route', or the name of the error: EnclosedError")
+    planner: str = Field("astar", description="name of the planner")
+    max_ratio: float | None = Field(
+        None, ge=1, description="of the route's length to that of the best in the true world"
+    )
+
+
+class BoundSettings(Settings):
+    """What a figure is held to."""
+
+    min: float | None = Field(None, description="it is at least this")
+    max: float | None = Field(None, description="it is at most this")
+
+
+class LogSettings(Settings):
+    """A recorded log instead of a world."""
+
+    path: str = Field(description="folder of the log, from the scenario's file on")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scenario:
+    """One case, validated."""
+
+    name: str
+    path: Path  #: of its file
+    why: str  #: the reason that it exists
+    seed: int
+    log: Path | None
+    world: WorldGenerator | None
+    solids: tuple[SolidSettings, ...]
+    holes: tuple[HoleSettings, ...]
+    sensor: SensorSettings
+    scan: ScanSettings | None
+    drive: DriveSettings | None
+    mapper: MapperSettings
+    ground: GroundSettings
+    queries: tuple[QuerySettings, ...]
+    bounds: Mapping[str, Bound]
+
+
+def find_scenarios(places: Iterable[Path]) -> list[Path]:
+    """Return the scenario files in folders, at any depth, by name.
+
+    Raises
+    ------
+    FileFormatError
+        A place that does not exist, or holds no scenario.
+    """
+    found: list[Path] = []
+    for place in places:
+        files = [place] if place.is_file() else sorted(place.rglob(FILE))
+        if not files:
+            raise FileFormatError(place, f"a folder with {FILE} files in it", "none")
+        found += files
+    return list(dict.fromkeys(found))
+
+
+def load_scenario(path: Path) -> Scenario:
+    """Return the scenario of a file, called after its folder.
+
+    Raises
+    ------
+    FileFormatError
+        Not TOML; a table or a key that a scenario does not have (the nearest is named), one that
+        it lacks, or a value out of its range.
+    """
+    content = _read(path)
+    try:
+        return _scenario(path, content)
+    except FileFormatError:
+        raise
+    except InputError as error:
+        raise FileFormatError(
+            path, f"{error.name} to be {error.expected}", error.got, hint=error.hint
+        ) from error
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise FileFormatError(path, "a scenario file", "no file of that name") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise FileFormatError(path, "a TOML file", str(error)) from error
+
+
+class _Head(Settings):
+    """What stands before the tables, and the tables' names."""
+
+    why: str = Field(min_length=1, description="the reason that the scenario exists")
+    seed: int = Field(0, ge=0, description="of all random numbers")
+    world: dict[str, Any] | None = None
+    log: dict[str, Any] | None = None
+    sensor: dict[str, Any] = Field(default_factory=dict)
+    scan: dict[str, Any] | None = None
+    drive: dict[str, Any] | None = None
+    mapper: dict[str, Any] = Field(default_factory=dict)
+    ground: dict[str, Any] = Field(default_factory=dict)
+    queries: tuple[dict[str, Any], ...] = ()
+    bounds: dict[str, dict[str, Any]] = Field(default_factory=dict)
+
+
+def _scenario(path: Path, content: dict[str, Any]) -> Scenario:
+    head = _Head(**content)
+    if (head.world is None) == (head.log is None):
+        raise InputError("scenario", "a [world] or a [log]", "both" if head.log else "neither")
+    if head.world is not None and head.drive is None:
+        raise InputError("scenario", "a [drive] through its [world]", "none")
+    world = dict(head.world or {})
+    solids, holes = world.pop("solids", ()), world.pop("holes", ())
+    return Scenario(
+        name=path.parent.name if path.name == FILE else path.stem,
+        path=path,
+        why=" ".join(head.why.split()),
+        seed=head.seed,
+        log=None if head.log is None else path.parent / LogSettings(**head.log).path,
+        world=None if head.world is None else _generator(world, path.parent),
+        solids=tuple(SolidSettings(**table) for table in solids),
+        holes=tuple(HoleSettings(**table) for table in holes),
+        sensor=SensorSettings(**head.sensor),
+        scan=None if head.scan is None else ScanSettings(**head.scan),
+        drive=None if head.drive is None else DriveSettings(**head.drive),
+        mapper=MapperSettings(**head.mapper),
+        ground=GroundSettings(**head.ground),
+        queries=tuple(QuerySettings(**table) for table in head.queries),
+        bounds={name: _bound(name, table) for name, table in head.bounds.items()},
+    )
+
+
+def _generator(table: dict[str, Any], folder: Path) -> WorldGenerator:
+    kind = table.pop("kind", "empty")
+    if kind not in GENERATORS:
+        raise InputError("world.kind", f"one of {', '.join(sorted(GENERATORS))}", repr(kind))
+    if "path" in table:  # from the scenario's file on
+        table["path"] = str(folder / table["path"])
+    return GENERATORS[kind](**table)
+
+
+def _bound(name: str, table: dict[str, Any]) -> Bound:
+    bound = BoundSettings(**table)
+    if bound.min is None and bound.max is None:
+        raise InputError(f"bounds.{name}", "min, max, or both", "neither")
+    return Bound(min=bound.min, max=bound.max)

@@ -1,0 +1,95 @@
+"""The queries of a scenario: routes on the map, held against the true world."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from groundmap import ConfidenceGrid
+from groundmap.arrays import Floats
+from groundmap.simulate.truth import touched_cells
+from planners.errors import PlanningError
+from planners.problem import PlanningProblem
+from planners.registry import plan
+from planners.scenario.case import QuerySettings
+from planners.scenario.outcome import Bound, Figure
+from planners.scenario.simulated import Simulated
+
+FINE = 0.05  # [m], cells of the true world's map
+OUTCOME = "route"  # what is expected where no error is
+
+
+class Answer(NamedTuple):
+    """What became of one query."""
+
+    query: QuerySettings
+    outcome: str  #: "route", or the error's name
+    reason: str  #: the error's sentence
+    waypoints: Floats | None  #: shape (n, 2) [m, map]
+    figures: dict[str, Figure]
+
+
+def ask(query: QuerySettings, grid: ConfidenceGrid) -> Answer:
+    """Plan on a map."""
+    try:
+        route = plan(
+            PlanningProblem(
+                grid, start=query.start, goal=query.goal, footprint=query.footprint
+            ),
+            planner=query.planner,
+        )
+    except PlanningError as error:
+        name = type(error).__name__
+        return Answer(query, name, str(error), None, {"outcome": name})
+    figures: dict[str, Figure] = {
+        "outcome": OUTCOME,
+        "length": route.length,
+        "min_clearance": route.min_clearance,
+    }
+    return Answer(query, OUTCOME, "", route.waypoints, figures)
+
+
+def held_to_truth(answer: Answer, simulated: Simulated, fine: ConfidenceGrid) -> Answer:
+    """Add what the true world says of a route: how near it comes, how much longer it is."""
+    if answer.waypoints is None:
+        return answer
+    query = answer.query
+    radius = query.footprint if query.robot_radius is None else query.robot_radius
+    line = shapely.LineString(answer.waypoints)
+    distances = shapely.distance(line, shapely.get_parts(simulated.truth.obstacles))
+    best = ask(query.model_copy(update={"footprint": radius, "planner": "astar"}), fine)
+    optimum = best.figures.get("length")
+    figures: dict[str, Figure] = {
+        **answer.figures,
+        "true_clearance": float(distances.min()) if len(distances) else None,
+        "collisions": int((distances < radius).sum()),
+        "optimum": optimum,
+    }
+    if isinstance(optimum, float) and optimum > 0:
+        figures["ratio"] = float(shapely.length(line)) / optimum
+    return answer._replace(figures=figures)
+
+
+def bounds_of(query: QuerySettings) -> dict[str, Bound]:
+    """Return what the figures of a query are held to."""
+    bounds = {"outcome": Bound(equals=query.expect)}
+    if query.expect == OUTCOME:
+        bounds["collisions"] = Bound(max=0)
+    if query.max_ratio is not None:
+        bounds["ratio"] = Bound(max=query.max_ratio)
+    return bounds
+
+
+def true_map(simulated: Simulated) -> ConfidenceGrid:
+    """Return the true world as a map of fine cells, free wherever no obstacle is."""
+    window = simulated.window
+    grid = ConfidenceGrid(resolution=FINE)
+    rows, cols = np.ceil(np.array(window.count.shape) * window.resolution / FINE).astype(int)
+    lower = np.floor(window.origin / FINE).astype(np.int64)[::-1]
+    nonfree = touched_cells(
+        simulated.truth.obstacles, lower[::-1] * FINE, FINE, (int(rows), int(cols))
+    )
+    grid.fuse(lower, np.where(nonfree, 1.0, -1.0).astype(np.float32))
+    return grid
