@@ -13,7 +13,7 @@ from groundmap.heights import FlatView
 from groundmap.kernels.raster import draw_surfaces, fill_star
 from groundmap.settings import MapperSettings
 from groundmap.sight2d import SightFan
-from groundmap.surfaces import Surfaces
+from groundmap.surfaces import SurfaceKind, Surfaces
 from groundmap.uncertainty import MODELS
 
 MARGIN = 1  # [cells] around what is drawn, so that rounding can't push a border cell outside
@@ -72,11 +72,22 @@ def evidence_of(
         )
     z = np.zeros(shape[::-1], dtype=np.float32)
     on_surface, around = model.evidence(surfaces.reach, grid.resolution)
+    belief = fan.contradictions.belief
+    drawn = surfaces.kind != SurfaceKind.DOUBTFUL
     if len(free):
         odd = np.zeros(z.shape, dtype=np.uint8)
         free = free - lower
         fill_star(z, odd, origin - lower, free[:, 0], free[:, 1], fan.joined)
-    draw_surfaces(z, ends - lower, cores - lower, outlines - lower, caps, discs, on_surface, around)
+    draw_surfaces(
+        z,
+        ends[drawn] - lower,
+        cores[drawn] - lower,
+        outlines[drawn] - lower,
+        caps[drawn],
+        discs[drawn],
+        (on_surface * belief)[drawn],
+        (around * belief)[drawn],
+    )
     return Evidence(lower[::-1].astype(np.int64), z)
 
 

@@ -18,7 +18,8 @@ from groundmap.grid import ConfidenceGrid
 from groundmap.ground import GroundPlane
 from groundmap.heights import FlatView, flatten
 from groundmap.settings import MapperSettings
-from groundmap.sight2d import SightFan, seen_through, visible_freespace
+from groundmap.sight2d import SightFan, visible_freespace
+from groundmap.smoothing import smoothed
 from groundmap.stages import Stages
 from groundmap.surfaces import Surfaces, find_surfaces
 from groundmap.triangulation import Mesh, triangulate
@@ -101,7 +102,6 @@ class GroundMapper:
             The view has no plane, or its camera looks at the ground or the sky.
         """
         parts = self.explain(view)
-        contradictions = seen_through(parts.flat, parts.fan, parts.surfaces)
         with self.stages.timed("fuse"):
             self.grid.fuse(parts.evidence.lower, parts.evidence.z)
             self.grid.add_drop_offs(drop_off_cells(parts.flat, self.grid))
@@ -109,13 +109,13 @@ class GroundMapper:
         self.stats.views += 1
         self.stats.features_used += parts.flat.used
         self.stats.features_dropped.update(parts.flat.dropped)
-        self.stats.seen_through += contradictions
+        self.stats.seen_through += parts.fan.contradictions.features
         self.stats.through_viewpoint += parts.surfaces.through_viewpoint
 
     def explain(self, view: View) -> ViewParts:
         """Return what `integrate` would fuse, with every step on the way; changes nothing."""
         with self.stages.timed("heights"):
-            flat = flatten(view, self.settings)
+            flat = smoothed(flatten(view, self.settings), self.settings)
         with self.stages.timed("triangulate"):
             mesh = triangulate(flat.points, flat.segments)
         with self.stages.timed("surfaces"):

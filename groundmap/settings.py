@@ -77,6 +77,20 @@ class MapperSettings(Settings):
     link_height: float = Field(
         0.5, ge=0, description="height band of a point feature, for links [m]"
     )
+    doubt: float = Field(
+        3.0, ge=1, description="unbelieved links up to this many times as long still end sight"
+    )
+    smoothing: float = Field(
+        0.25, ge=0, description="features this near across the line of sight are averaged [m]"
+    )
+    grant_height: float = Field(
+        0.5,
+        gt=0,
+        description="sight that comes down to this share of the camera's height grants freespace",
+    )
+    sight_gap: float = Field(
+        0.8, ge=0, description="gap between lines of sight that counts as seen [m]"
+    )
     support_width: float = Field(
         0.3, gt=0, description="half-width of the ground a ground feature vouches for [m]"
     )

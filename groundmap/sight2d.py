@@ -8,7 +8,8 @@ import numpy as np
 
 from groundmap.arrays import Bools, Floats, Ints
 from groundmap.heights import FlatView
-from groundmap.kernels.envelope import fill_gaps, upper_envelope
+from groundmap.kernels.envelope import join_envelopes, upper_envelope
+from groundmap.lines_of_sight import Contradictions, contradictions, support_chords
 from groundmap.settings import MapperSettings
 from groundmap.surfaces import RADIAL, Surfaces
 
@@ -23,6 +24,7 @@ class SightFan(NamedTuple):
     surface: Ints  #: shape (k,), row of the surfaces; -1 where ground support ends it
     free: Floats  #: shape (k, 2, 2) [m, view], where freespace ends: a reach before the surface
     joined: Bools  #: shape (k,), the next triangle (after the last the first) begins where it ends
+    contradictions: Contradictions  #: surfaces that features are seen through
 
     @property
     def area(self) -> float:
@@ -54,14 +56,23 @@ class _Edges(NamedTuple):
 def visible_freespace(flat: FlatView, surfaces: Surfaces, settings: MapperSettings) -> SightFan:
     """Sweep the bearings: the nearest surface ends sight; where there is none, ground support.
 
-    A ground feature at range r supports the bearings within min(support_width / r,
-    support_angle), out to r. Bearings with neither surface nor support are not in the fan.
+    Surfaces that more features are seen through than make them up hide nothing. One that is seen
+    by high lines of sight alone ends sight, but does not say that the ground before it is free:
+    there, too, freespace reaches as far as ground support (`support_chords`). Bearings with
+    neither are not in the fan.
     """
-    walls = _by_bearing(surfaces.ends)
-    grounds = _by_bearing(_support_chords(flat.supports, settings))
+    doubts = contradictions(flat, surfaces)
+    hiding = np.flatnonzero(doubts.hiding)
+    walls = _by_bearing(surfaces.ends[hiding])
+    walls = walls._replace(row=hiding[walls.row])
+    grounds = _by_bearing(support_chords(flat, settings))
     nearest = upper_envelope(walls.t0, walls.t1, walls.a, walls.b)
     farthest = upper_envelope(grounds.t0, grounds.t1, -grounds.a, -grounds.b)
-    low, high, number, supported = fill_gaps(*nearest, *farthest)
+    lowest = surfaces.bottoms[walls.row].min(axis=1)
+    granting = lowest <= settings.grant_height * flat.camera_height
+    low, high, number, supported = join_envelopes(
+        *nearest, granting, walls.a, walls.b, *farthest, grounds.a, grounds.b
+    )
     ends = np.empty((len(low), 2, 2))
     surface = np.full(len(low), NO_SURFACE, dtype=np.int64)
     for edges, rows in ((walls, ~supported), (grounds, supported)):
@@ -77,47 +88,7 @@ def visible_freespace(flat: FlatView, surfaces: Surfaces, settings: MapperSettin
         surface=surface,
         free=_before_surfaces(ends, surface, surfaces),
         joined=np.isclose(following, high, rtol=0.0, atol=1e-15),
-    )
-
-
-def seen_through(flat: FlatView, fan: SightFan, surfaces: Surfaces) -> int:
-    """Count the features whose line of sight passes below the top of a surface in front of them.
-
-    Features that are seen over a surface are behind it, as they should be; these contradict it.
-    """
-    points = np.concatenate([flat.points, flat.supports])
-    heights = np.concatenate([flat.heights, flat.support_heights])
-    bearing = np.arctan2(points[:, 1], points[:, 0])
-    piece = np.searchsorted(fan.bearings[:, 0], bearing, side="right") - 1
-    piece = np.maximum(piece, 0)
-    covered = np.zeros(len(points), dtype=np.bool_)
-    if len(fan.surface):
-        covered = (bearing >= fan.bearings[piece, 0]) & (bearing <= fan.bearings[piece, 1])
-        covered &= fan.surface[piece] != NO_SURFACE
-    points, heights, piece = points[covered], heights[covered], piece[covered]
-    feature = flat.feature[covered]
-    row = fan.surface[piece]
-    ends = surfaces.ends[row]
-    edge = ends[:, 1] - ends[:, 0]
-    share = _cross(ends[:, 0], edge) / _cross(points, edge)  # range of the surface / of the point
-    hit = points * share[:, None] - ends[:, 0]
-    t = np.clip((hit * edge).sum(axis=1) / (edge**2).sum(axis=1), 0.0, 1.0)
-    reach = (1 - t) * surfaces.reach[row, 0] + t * surfaces.reach[row, 1]
-    top = (1 - t) * surfaces.tops[row, 0] + t * surfaces.tops[row, 1]
-    behind = (1.0 - share) * np.hypot(points[:, 0], points[:, 1]) > 2 * reach + 0.05
-    sight = flat.camera_height + (heights - flat.camera_height) * share
-    return len(np.unique(feature[behind & (sight < top)]))
-
-
-def _support_chords(supports: Floats, settings: MapperSettings) -> Floats:
-    """Return the chord that each ground feature supports, shape (k, 2, 2) [m, view]."""
-    radius = np.hypot(supports[:, 0], supports[:, 1])
-    half = np.minimum(settings.support_width / radius, settings.support_angle)
-    ray = supports / radius[:, None]
-    cos, sin = np.cos(half)[:, None], np.sin(half)[:, None]
-    side = np.stack([-ray[:, 1], ray[:, 0]], axis=1)
-    return radius[:, None, None] * np.stack(
-        [ray * cos - side * sin, ray * cos + side * sin], axis=1
+        contradictions=doubts,
     )
 
 

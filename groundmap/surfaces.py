@@ -15,6 +15,7 @@ from groundmap.triangulation import Mesh
 from groundmap.uncertainty import MODELS
 
 RADIAL = 1e-9  # [rad], an edge that spans less is seen end-on
+FRONTIER = 255  # the kind of an edge that is no surface
 SHARE_OF_FOOTPRINT = 0.8  # a link shorter than this share of the narrowest robot stops that robot
 
 
@@ -24,6 +25,7 @@ class SurfaceKind(IntEnum):
     SEGMENT = 0
     LINK = 1
     LONE = 2
+    DOUBTFUL = 3  #: a link too long to believe, but not by far: it ends sight and is not drawn
 
 
 class Surfaces(NamedTuple):
@@ -32,6 +34,7 @@ class Surfaces(NamedTuple):
     ends: Floats  #: shape (s, 2, 2) [m, view], counter-clockwise around the viewpoint
     cores: Floats  #: shape (s, 2, 2) [m, view], what spreads: the same, or a lone point's core
     reach: Floats  #: shape (s, 2) [m], how far freespace ends before it
+    bottoms: Floats  #: shape (s, 2) [m] above the ground
     tops: Floats  #: shape (s, 2) [m] above the ground
     kind: Bytes  #: shape (s,), `SurfaceKind`
     discs: Floats  #: shape (s,) [m], radius of a lone point's disc; 0 for the others
@@ -74,19 +77,23 @@ def find_surfaces(flat: FlatView, mesh: Mesh, settings: MapperSettings) -> Surfa
     min(max(link_length, link_angle r), 0.8 narrowest_footprint), r the range of the nearer end, if
     the features' height bands overlap. A vertex with neither is a disc of max(cell / 2, sigma), but
     not larger than such a link is long.
-    All other edges are frontiers: they bound nothing and grant nothing.
+    All other edges are frontiers: they grant nothing, and bound nothing unless they are doubtful,
+    which they are up to `doubt` times the length that would be believed.
     """
     vertices = _vertices(flat, mesh, settings)
-    believed = mesh.constrained | _believed(vertices, mesh.edges, settings)
-    pieces, constrained, blocked = _away_from_viewpoint(
-        vertices.xy, mesh.edges[believed], mesh.constrained[believed], settings.min_range
+    kinds = _kinds(vertices, mesh, settings)
+    firm = kinds < SurfaceKind.DOUBTFUL
+    bounding = kinds <= SurfaceKind.DOUBTFUL
+    pieces, kinds, blocked = _away_from_viewpoint(
+        vertices.xy, mesh.edges[bounding], kinds[bounding], settings.min_range
     )
     ends = pieces.at(vertices)
     lone = np.ones(len(vertices.xy), dtype=np.bool_)
-    lone[mesh.edges[believed]] = False
+    lone[mesh.edges[firm]] = False
     near = np.hypot(vertices.xy[:, 0], vertices.xy[:, 1]) < settings.min_range
     blocked += int((lone & near).sum())
-    discs = _discs(vertices, lone & ~near, ends)
+    drawn = kinds < SurfaceKind.DOUBTFUL
+    discs = _discs(vertices, lone & ~near, _Vertices(*(values[drawn] for values in ends)))
     # However unsure a point is, its disc hides no more than a link to a neighbour would.
     bound = _longest_link(np.hypot(discs.xy[:, 0], discs.xy[:, 1]), settings)
     radius = np.maximum(0.5 * settings.resolution, np.minimum(discs.sigma, bound))
@@ -94,24 +101,21 @@ def find_surfaces(flat: FlatView, mesh: Mesh, settings: MapperSettings) -> Surfa
     core = np.full(len(radius), MODELS[settings.uncertainty].core_radius(settings.resolution))
     cores = np.concatenate([ends.xy, _silhouettes(discs.xy, core)])
     reach = settings.spread_sigmas * np.concatenate([ends.sigma, _twice(discs.sigma)])
+    bottoms = np.concatenate([ends.low, _twice(discs.low)])
     tops = np.concatenate([ends.high, _twice(discs.high)])
-    kind = np.concatenate(
-        [
-            np.where(constrained, SurfaceKind.SEGMENT, SurfaceKind.LINK),
-            np.full(len(radius), SurfaceKind.LONE),
-        ]
-    )
+    kind = np.concatenate([kinds, np.full(len(radius), SurfaceKind.LONE)])
     clockwise = _cross(everything[:, 0], everything[:, 1]) < 0
-    for pairs in (everything, cores, reach, tops):
+    for pairs in (everything, cores, reach, bottoms, tops):
         pairs[clockwise] = pairs[clockwise, ::-1]
     return Surfaces(
         ends=everything,
         cores=cores,
         reach=reach,
+        bottoms=bottoms,
         tops=tops,
         kind=kind.astype(np.uint8),
         discs=np.concatenate([np.zeros(len(ends.xy)), radius]),
-        frontiers=vertices.xy[mesh.edges[~believed]],
+        frontiers=vertices.xy[mesh.edges[~firm]],
         through_viewpoint=blocked,
     )
 
@@ -139,15 +143,19 @@ def _vertices(flat: FlatView, mesh: Mesh, settings: MapperSettings) -> _Vertices
     return _Vertices(mesh.points, low, high, sigma)
 
 
-def _believed(vertices: _Vertices, edges: Ints, settings: MapperSettings) -> Bools:
-    a, b = edges[:, 0], edges[:, 1]
+def _kinds(vertices: _Vertices, mesh: Mesh, settings: MapperSettings) -> Bytes:
+    """Return the `SurfaceKind` of each edge, or `FRONTIER`."""
+    a, b = mesh.edges[:, 0], mesh.edges[:, 1]
     length = np.hypot(*(vertices.xy[b] - vertices.xy[a]).T)
-    longest = _longest_link(np.hypot(*vertices.xy.T)[edges].min(axis=1), settings)
+    longest = _longest_link(np.hypot(*vertices.xy.T)[mesh.edges].min(axis=1), settings)
     apart = np.maximum(vertices.low[a], vertices.low[b]) - np.minimum(
         vertices.high[a], vertices.high[b]
     )
-    believed: Bools = (length <= longest) & (apart <= settings.link_height)
-    return believed
+    kinds = np.full(len(mesh.edges), FRONTIER, dtype=np.uint8)
+    kinds[length <= settings.doubt * longest] = SurfaceKind.DOUBTFUL
+    kinds[(length <= longest) & (apart <= settings.link_height)] = SurfaceKind.LINK
+    kinds[mesh.constrained] = SurfaceKind.SEGMENT
+    return kinds
 
 
 def _longest_link(radius: Floats, settings: MapperSettings) -> Floats:
@@ -160,9 +168,9 @@ def _longest_link(radius: Floats, settings: MapperSettings) -> Floats:
 
 
 def _away_from_viewpoint(
-    xy: Floats, edges: Ints, constrained: Bools, min_range: float
-) -> tuple[_Pieces, Bools, int]:
-    """Clip edges to the outside of the circle of `min_range`; count those that lie inside."""
+    xy: Floats, edges: Ints, kinds: Bytes, min_range: float
+) -> tuple[_Pieces, Bytes, int]:
+    """Clip edges to the outside of the circle of `min_range`; count the firm ones inside."""
     inside = inside_circle(xy[edges[:, 0]], xy[edges[:, 1]], min_range)
     whole = inside.start >= inside.stop  # a circle that is only touched cuts nothing off
     before, after = ~whole & (inside.start > 0), ~whole & (inside.stop < 1)
@@ -170,8 +178,9 @@ def _away_from_viewpoint(
     spans = ((whole, zero, one), (before, zero, inside.start), (after, inside.stop, one))
     number = np.concatenate([np.flatnonzero(rows) for rows, _, _ in spans])
     span = np.concatenate([np.stack([t0, t1], axis=1)[rows] for rows, t0, t1 in spans])
-    blocked = int((~whole & ~before & ~after).sum())
-    return _Pieces(edges[number], span), constrained[number], blocked
+    inside_it = ~whole & ~before & ~after
+    blocked = int((inside_it & (kinds < SurfaceKind.DOUBTFUL)).sum())
+    return _Pieces(edges[number], span), kinds[number], blocked
 
 
 def _discs(vertices: _Vertices, lone: Bools, ends: _Vertices) -> _Vertices:

@@ -8,12 +8,15 @@ import numpy as np
 
 from groundmap.arrays import Floats
 
+PEAK = 6.0  # z on a surface, of that around it
+
 
 class Ellipsoid:
     """The third solution of the paper: a constant-density ellipse along the feature's covariance.
 
-    The surface itself keeps z = 1; around it, z is such that a ray through the spread adds up to
-    one cell of surface.
+    Around the surface, z is such that a ray through the spread adds up to one cell of surface. On
+    the surface itself it is six times as much, but 1 at most: 1 up to a standard deviation of one
+    and a half cells, and less the less is known of where the surface is.
     """
 
     name: ClassVar[str] = "ellipsoid"
@@ -54,7 +57,8 @@ class Ellipsoid:
 
     def evidence(self, reach: Floats, resolution: float) -> tuple[Floats, Floats]:
         """Return z on the surface and in the spread around it, shape (s,) each."""
-        return np.ones(len(reach)), _constant_density(reach, resolution)
+        density = _constant_density(reach, resolution)
+        return np.minimum(PEAK * density, 1.0), density
 
 
 class Radius(Ellipsoid):

@@ -38,7 +38,8 @@ def yaws(transforms: Floats) -> Floats:
 
 def apart(a: Floats, b: Floats) -> Floats:
     """Return the angles between two yaws, -π to π."""
-    return np.angle(np.exp(1j * (a - b)))
+    turn: Floats = np.angle(np.exp(1j * (a - b)))
+    return turn
 
 
 def moved(stops: Stops, seed: int = 1, **options: float) -> Drive:
@@ -46,7 +47,8 @@ def moved(stops: Stops, seed: int = 1, **options: float) -> Drive:
 
 
 def lengths(transforms: Floats) -> Floats:
-    return np.hypot(*np.diff(places(transforms), axis=0).T)
+    steps: Floats = np.hypot(*np.diff(places(transforms), axis=0).T)
+    return steps
 
 
 @given(tours(), st.floats(0.2, 3.0), st.floats(0.1, 1.0))
@@ -64,7 +66,7 @@ def test_a_drive_calls_at_every_stop_and_goes_straight_between(stops: Stops, eve
     for place, yaw in zip(places(true), yaws(true), strict=True):
         x, y, degrees = wanted[min(visited, len(wanted) - 1)]
         at = np.hypot(*(place - (x, y))) < 1e-9
-        visited += at and abs(apart(yaw, np.radians(degrees))) < 1e-9
+        visited += int(at and abs(apart(yaw, np.radians(degrees))) < 1e-9)
     assert visited >= len(wanted)
     driven = np.hypot(*np.diff(wanted[:, :2], axis=0).T).sum()
     assert lengths(true).sum() == pytest.approx(driven, abs=1e-9)
@@ -164,7 +166,7 @@ def test_a_drive_to_nowhere_is_refused() -> None:
     with pytest.raises(SettingsError, match=r"^every: expected greater than 0"):
         DriveSettings(stops=AHEAD, every=0.0)
     with pytest.raises(SettingsError, match=r"Did you mean 'yaw_drift'\?"):
-        DriveSettings(stops=AHEAD, yawdrift=0.1)
+        moved(AHEAD, yawdrift=0.1)
 
 
 def test_poses_that_are_none_are_refused() -> None:

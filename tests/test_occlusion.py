@@ -8,21 +8,22 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from groundmap.arrays import Bools, Floats, Ints
+from groundmap.arrays import Bools, Floats
 from groundmap.kernels.occlusion import first_hits, hidden
 from groundmap.simulate.occlusion import edges_of, in_sight
 from groundmap.simulate.world import Hole, Solid, World
 from strategies import rngs
 
 Heights = list[tuple[float, float]]
-Outlines = list[shapely.Polygon]
 
 MARGIN = 1e-7  # [m]: nearer than this to an edge, a line may count as either
 BOX = shapely.box(2.0, -1.0, 3.0, 1.0)
 EYE = np.array([0.0, 0.0, 1.0])
 
 
-def kernel(eye: Floats, targets: Floats, outlines: Outlines, heights: Heights) -> Bools:
+def kernel(
+    eye: Floats, targets: Floats, outlines: list[shapely.Polygon], heights: Heights
+) -> Bools:
     pieces = [edges_of(outline) for outline in outlines]
     starts = np.cumsum([0, *map(len, pieces)], dtype=np.int64)
     out = np.empty(len(targets), dtype=np.bool_)
@@ -42,9 +43,9 @@ def star(rng: np.random.Generator) -> shapely.Polygon:
     corners = rng.uniform(0.5, 3.0, (len(turns), 1)) * around
     outline = shapely.Polygon(corners + rng.uniform(-6.0, 6.0, 2))
     middle = outline.centroid
-    gap = 0.7 * shapely.distance(middle, outline.exterior)
     if outline.contains(middle) and rng.random() < 0.5:
-        outline = outline.difference(middle.buffer(gap, quad_segs=2))
+        gap = middle.buffer(0.7 * middle.distance(outline.exterior), quad_segs=2)
+        return outline.difference(gap)
     return outline
 
 
@@ -142,11 +143,6 @@ def test_a_place_inside_a_hollow_prism_is_hidden_by_its_walls_alone() -> None:
     assert kernel(eye, targets, [hollow], [(0.0, 2.0)]).tolist() == [False, True]
 
 
-def test_what_is_behind_the_eye_hides_nothing() -> None:
-    targets = np.array([(-4.0, 0.0, 1.0), (1.9, 0.0, 1.0)])
-    assert not kernel(EYE, targets, [BOX], [(0.0, 2.0)]).any()
-
-
 def test_glass_hides_nothing() -> None:
     target = np.array([(6.0, 0.0, 1.0)])
     for transparent in (False, True):
@@ -180,14 +176,6 @@ def below_ground(eye: Floats, target: Floats, hole: Hole) -> tuple[bool, bool]:
     return bool(((outside == 0) & (rim > 0.02)).all()), bool((outside > 0.02).any())
 
 
-def test_a_solid_before_a_hole_hides_its_floor() -> None:
-    hole, target = Hole(shapely.box(4, -1, 6, 1), depth=0.5), np.array([(5.9, 0.0, -0.4)])
-    bare = World(bounds=(0, -5, 10, 5), holes=(hole,))
-    assert in_sight(bare, EYE, target)[0]
-    blocked = World(bounds=bare.bounds, holes=(hole,), solids=(Solid(BOX, top=0.8),))
-    assert not in_sight(blocked, EYE, target)[0]
-
-
 @settings(max_examples=60)
 @given(rngs(), st.integers(0, 4))
 def test_first_hits_are_where_rays_first_meet_an_edge(rng: np.random.Generator, count: int) -> None:
@@ -196,19 +184,13 @@ def test_first_hits_are_where_rays_first_meet_an_edge(rng: np.random.Generator, 
     eye, bearings = rng.uniform(-7.0, 7.0, 2), rng.uniform(-np.pi, np.pi, 40)
     ranges, which = np.empty(40), np.empty(40, dtype=np.int64)
     first_hits(eye, bearings, edges, ranges, which)
-    assert_hits(eye, bearings, lines, ranges, which)
-
-
-def assert_hits(
-    eye: Floats, bearings: Floats, lines: list[shapely.LineString], ranges: Floats, which: Ints
-) -> None:
     start, walls = shapely.Point(eye), shapely.multilinestrings(lines)
     for bearing, distance, row in zip(bearings, ranges, which, strict=True):
         way = np.array([np.cos(bearing), np.sin(bearing)])
         ray = shapely.LineString([eye, eye + 50.0 * way])
         apart = shapely.distance(start, shapely.intersection(ray, walls))
         if np.isnan(apart):  # they don't meet
-            assert (distance, row) == (np.inf, -1)
+            assert [distance, row] == [np.inf, -1]
         else:
             assert distance == pytest.approx(apart, abs=1e-9)
             assert lines[row].distance(shapely.Point(eye + distance * way)) < 1e-9

@@ -56,7 +56,8 @@ def test_projection_is_that_of_a_pinhole_camera(
 ) -> None:
     pose, places = pose_of(rng), rng.uniform((-15, -15, -1), (15, 15, 3), (200, 3))
     pixels, seen = sensor.project(pose, places)
-    expected, (right, _, depth) = (lambda px, own: (px, own.T))(*pinhole(sensor, pose, places))
+    expected, own = pinhole(sensor, pose, places)
+    right, _, depth = own.T
     inside = (depth > NEAREST) & (np.hypot(right, depth) < sensor.max_range)
     for column in (expected[:, 0], expected[:, 1]):
         inside &= (column >= 0) & (column <= sensor.width_px)

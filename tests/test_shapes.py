@@ -105,10 +105,10 @@ def test_a_table_is_a_top_on_four_legs_below_it(rng: np.random.Generator, height
     width, depth = rng.uniform(0.6, 3.0, 2)
     top, *legs = table(x0 + width, y0, x0, y0 + depth, height=height, texture=2.0)
     assert top.outline.area == pytest.approx(width * depth)
-    assert (top.bottom, top.top) == (pytest.approx(height - SLAB), height)
+    assert [top.bottom, top.top] == pytest.approx([height - SLAB, height])
     assert len(legs) == 4
     for leg in legs:
-        assert (leg.bottom, leg.top) == (0.0, top.bottom)
+        assert [leg.bottom, leg.top] == [0.0, top.bottom]
         assert leg.outline.area == pytest.approx(LEG**2)
         assert top.outline.buffer(-0.1499).covers(leg.outline)
     union = shapely.union_all([leg.outline for leg in legs])

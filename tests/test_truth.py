@@ -94,9 +94,7 @@ def bearings(eye: Floats) -> Floats:
 
 @settings(max_examples=40)
 @given(rngs())
-def test_cells_are_visible_that_a_line_of_sight_in_the_images_reaches(
-    rng: np.random.Generator,
-) -> None:
+def test_cells_are_visible_that_a_line_in_both_images_reaches(rng: np.random.Generator) -> None:
     world = random_world(rng)
     poses = [(float(x), 4.0 + float(y), float(t)) for x, y, t in rng.normal(0, 0.3, (3, 3))]
     poses = [(min(x, 0.9), y, 3.0 * turn) for x, y, turn in poses]
@@ -108,8 +106,6 @@ def test_cells_are_visible_that_a_line_of_sight_in_the_images_reaches(
     np.testing.assert_array_equal(found.in_line.ravel()[sure], in_line[sure])
     np.testing.assert_array_equal(found.visible.ravel()[sure], visible[sure])
     assert not (found.visible & ~found.in_line).any()
-    assert sure.mean() > 0.9
-    np.testing.assert_allclose(found.viewpoints, [pose[:2] for pose in poses])
 
 
 @settings(max_examples=40)
@@ -118,7 +114,8 @@ def test_cells_are_nonfree_that_an_obstacle_reaches_into(rng: np.random.Generato
     world = random_world(rng)
     found = truth(world, (0.0, 4.0, 0.0))
     solids = [solid for solid in world.solids if solid.top > 0.15 and solid.bottom < 2.0]
-    boxes = np.array([one.outline.bounds for one in (*solids, *world.holes)]).reshape(-1, 4)
+    outlines = [one.outline for one in solids] + [hole.outline for hole in world.holes]
+    boxes = np.array([outline.bounds for outline in outlines]).reshape(-1, 4)
     x, y = centres().T[:, :, None]
     xmin, ymin, xmax, ymax = boxes.T[:, None]
     deep = np.minimum(np.minimum(x - xmin, xmax - x), np.minimum(y - ymin, ymax - y)) + 0.125
@@ -127,10 +124,15 @@ def test_cells_are_nonfree_that_an_obstacle_reaches_into(rng: np.random.Generato
     np.testing.assert_array_equal(found.nonfree.ravel()[sure], touched[sure])
 
 
+@pytest.mark.parametrize("size", [0.01, 0.03, 0.2])
+def test_an_obstacle_that_reaches_into_the_window_from_outside_is_nonfree(size: float) -> None:
+    found = truth(World(bounds=BOUNDS, solids=(block(-1, -1, size, size),)), (0.5, 4.0, 0.0))
+    assert np.argwhere(found.nonfree).tolist() == [[0, 0]]
+
+
 def test_a_cell_that_an_obstacle_ends_at_is_free() -> None:
     found = truth(World(bounds=BOUNDS, solids=(block(4, 3, 5, 5),)), (0.0, 4.0, 0.0))
     assert found.nonfree.sum() == 4 * 8
-    assert found.obstacles.equals(shapely.box(4, 3, 5, 5))
 
 
 def test_nothing_is_in_line_in_a_wall_or_behind_it() -> None:
@@ -171,11 +173,11 @@ def test_the_place_of_what_is_gone_is_visible_only_afterwards() -> None:
     assert after.surfaces.shape == (0, 2)
 
 
-def test_what_has_moved_away_left_no_surface_where_it_was_seen() -> None:
-    world = World(bounds=BOUNDS, solids=(block(3, 1, 4, 2, velocity=(0.0, 3.0)),))
-    found = truth(world, (0.0, 1.5, 0.0), (0.0, 1.5, np.pi))  # the last view looks away
-    assert found.obstacles.equals(shapely.box(3, 4, 4, 5))
-    assert found.surfaces.shape == (0, 2)
+def test_what_comes_later_is_a_surface_once_it_is_there() -> None:
+    world = World(bounds=BOUNDS, solids=(block(4, 3, 5, 5, present=(0.5, 9.0)),))
+    away, towards = (0.0, 4.0, np.pi), (0.0, 4.0, 0.0)
+    assert len(truth(world, towards, away).surfaces) == 0
+    assert len(truth(world, away, towards).surfaces) == 16
 
 
 @pytest.mark.parametrize("yaw", [0.0, np.pi])

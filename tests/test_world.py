@@ -168,7 +168,8 @@ def test_holes_deeper_than_a_step_are_in_the_way_but_not_of_sight() -> None:
 
 @given(rngs())
 def test_obstacles_are_every_place_that_one_of_them_covers(rng: np.random.Generator) -> None:
-    outlines = [square(*rng.uniform(0, 5, 2), side=2.0) for _ in range(rng.integers(0, 6))]
+    corners = rng.uniform(0.0, 5.0, (rng.integers(0, 6), 2))
+    outlines = [shapely.box(x, y, x + 2.0, y + 2.0) for x, y in corners]
     found = world_of(*(Solid(outline, top=1.0) for outline in outlines)).obstacles(STEP, ROBOT)
     x, y = rng.uniform(0.0, 8.0, (2, 200))
     expected = np.zeros(200, dtype=np.bool_)

@@ -8,15 +8,20 @@ nearly black.
 from groundmap.draw.figure import check_picture, new_figure, save_figure
 from groundmap.draw.maps import draw_grid, draw_trajectory, draw_verdicts, known_bounds
 from groundmap.draw.routes import draw_route
+from groundmap.draw.truth import draw_case, draw_difference, draw_truth, figure_png
 from groundmap.draw.views import draw_view
 
 __all__ = [
     "check_picture",
+    "draw_case",
+    "draw_difference",
     "draw_grid",
     "draw_route",
     "draw_trajectory",
+    "draw_truth",
     "draw_verdicts",
     "draw_view",
+    "figure_png",
     "known_bounds",
     "new_figure",
     "save_figure",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -42,27 +42,21 @@ class Finding(IntEnum):
     FALSE_FREE = 5  #: free, but non-free in truth, or behind a surface
 
 
-# The worse, the darker; of what is right, free is the lightest and non-free nearly black.
-COLORS: dict[Finding, tuple[float, float, float]] = {
-    Finding.FREE: SHADES[CellState.FREE][1],
-    Finding.NONFREE: SHADES[CellState.NONFREE][1],
-    Finding.FALSE_FREE: (0.84, 0.03, 0.09),
-    Finding.FALSE_NONFREE: (0.95, 0.50, 0.05),
-    Finding.MISSED: (0.60, 0.70, 0.81),
-    Finding.UNSEEN: (0.83, 0.83, 0.82),
+# Label and colour: the worse, the darker; what is right is the lightest or nearly black.
+FINDINGS: dict[Finding, tuple[str, tuple[float, float, float]]] = {
+    Finding.FREE: ("free, right", SHADES[CellState.FREE][1]),
+    Finding.NONFREE: ("non-free, right", SHADES[CellState.NONFREE][1]),
+    Finding.FALSE_FREE: ("FALSE FREE", (0.84, 0.03, 0.09)),
+    Finding.FALSE_NONFREE: ("false non-free", (0.93, 0.45, 0.03)),
+    Finding.MISSED: ("visible, not known", (0.60, 0.70, 0.81)),
+    Finding.UNSEEN: ("not in sight", SHADES[CellState.UNKNOWN][1]),
 }
-LABELS = {
-    Finding.FREE: "free, right",
-    Finding.NONFREE: "non-free, right",
-    Finding.FALSE_FREE: "FALSE FREE",
-    Finding.FALSE_NONFREE: "false non-free",
-    Finding.MISSED: "visible, not known",
-    Finding.UNSEEN: "not in sight",
-}
-OBSTACLE, GROUND, UNSEEN = COLORS[Finding.NONFREE], COLORS[Finding.FREE], COLORS[Finding.UNSEEN]
+GROUND, OBSTACLE, UNSEEN = (
+    FINDINGS[finding][1] for finding in (Finding.FREE, Finding.NONFREE, Finding.UNSEEN)
+)
 
 WIDE = 2.0  # maps this many times as wide as tall have their panels one below the other
-ROW_WIDTH, LONGEST = 13.5, 8.5  # [inch], of three panels side by side; of one panel's long side
+ROW, STACK, LONGEST = 4.0, 10.8, 8.5  # [inch], a panel's width in a row, in a stack; its height
 NARROWEST = 2.9  # [inch], of a panel: room for its legend
 LEGEND_COLUMN, LEGEND_DROP = 1.5, 0.45  # [inch], wide; below the axes, past the ticks and x [m]
 
@@ -90,7 +84,8 @@ def findings(states: Bytes, *, nonfree: Bools, visible: Bools, behind: Bools) ->
     --------
     >>> states = np.array([[CellState.FREE, CellState.FREE, CellState.UNKNOWN]])
     >>> wall, seen = np.array([[False, True, False]]), np.array([[True, False, False]])
-    >>> [Finding(cell).name for cell in findings(states, nonfree=wall, visible=seen, behind=~seen)[0]]
+    >>> found = findings(states, nonfree=wall, visible=seen, behind=~seen)
+    >>> [Finding(cell).name for cell in found[0]]
     ['FREE', 'FALSE_FREE', 'UNSEEN']
     """
     for name, cells in (("nonfree", nonfree), ("visible", visible), ("behind", behind)):
@@ -128,20 +123,15 @@ def draw_truth(
     resolution : float [m]
     ax : matplotlib axes
     """
-    from matplotlib.patches import Patch, PathPatch
+    from matplotlib.patches import PathPatch
 
     picture = _paint(np.where(visible[..., None], GROUND, UNSEEN), origin, resolution, ax)
     # The edge keeps walls thinner than a pixel in the picture.
     solid = PathPatch(_path_of(outline), facecolor=OBSTACLE, edgecolor=OBSTACLE, zorder=1)
     solid.set_linewidth(0.6)
     ax.add_patch(solid)
-    patches = [
-        Patch(facecolor=color, edgecolor="0.4", linewidth=0.6, label=label)
-        for color, label in (
-            (OBSTACLE, "obstacle"), (GROUND, "ground in sight"), (UNSEEN, "not in sight"),
-        )
-    ]  # fmt: skip
-    return [picture, solid, add_to_legend(ax, patches)]
+    names = {"obstacle": OBSTACLE, "ground in sight": GROUND, "not in sight": UNSEEN}
+    return [picture, solid, _name_colors(names, ax=ax)]
 
 
 def draw_difference(
@@ -167,23 +157,20 @@ def draw_difference(
     resolution : float [m]
     ax : matplotlib axes
     """
-    from matplotlib.patches import Patch
-
     found = findings(states, nonfree=nonfree, visible=visible, behind=behind)
-    palette = np.array([COLORS[finding] for finding in Finding])
+    palette = np.array([FINDINGS[finding][1] for finding in Finding])
     picture = _paint(palette[found], origin, resolution, ax)
     rows, cols = np.nonzero(found == Finding.FALSE_FREE)
     x, y = as_floats("origin", origin, (2,))
     (dots,) = ax.plot(
         x + (cols + 0.5) * resolution, y + (rows + 0.5) * resolution, "s",
-        color=COLORS[Finding.FALSE_FREE], markersize=1.6, markeredgewidth=0.0, zorder=1,
+        color=FINDINGS[Finding.FALSE_FREE][1], markersize=2.4, markeredgewidth=0.0, zorder=1,
     )  # fmt: skip
-    patches = [
-        Patch(facecolor=COLORS[finding], edgecolor="0.4", linewidth=0.6,
-              label=f"{label}: {np.count_nonzero(found == finding)}")
-        for finding, label in LABELS.items()
-    ]  # fmt: skip
-    return [picture, dots, add_to_legend(ax, patches)]
+    names = {
+        f"{label}: {np.count_nonzero(found == finding)}": color
+        for finding, (label, color) in FINDINGS.items()
+    }
+    return [picture, dots, _name_colors(names, ax=ax)]
 
 
 def draw_case(
@@ -225,7 +212,8 @@ def draw_case(
     truth, mapped, difference = axes
     draw_truth(outline, visible=visible, **place, ax=truth)
     bounds = np.array([*truth.get_xlim(), *truth.get_ylim()])[[0, 2, 1, 3]]
-    draw_grid(grid, bounds=bounds, ax=mapped)
+    for scale in draw_grid(grid, bounds=bounds, ax=mapped)[1:3]:
+        scale.remove()  # the ticks say it already
     draw_difference(
         window.states(), nonfree=nonfree, visible=visible, behind=behind, **place, ax=difference
     )
@@ -250,10 +238,23 @@ def _paint(image: Floats, origin: npt.ArrayLike, resolution: float, ax: Axes) ->
     rows, cols = image.shape[:2]
     x, y = as_floats("origin", origin, (2,))
     extent = (x, x + cols * resolution, y, y + rows * resolution)
-    picture = ax.imshow(image, origin="lower", extent=extent, interpolation="nearest", zorder=0)
+    # Antialiased only where cells are smaller than a few pixels: a thin wall pales, but stays.
+    picture = ax.imshow(image, origin="lower", extent=extent, interpolation="antialiased", zorder=0)
     ax.set_xlim(extent[:2])
     ax.set_ylim(extent[2:])
     return picture
+
+
+def _name_colors(colors: Mapping[str, tuple[float, float, float]], *, ax: Axes) -> Artist:
+    from matplotlib.patches import Patch
+
+    return add_to_legend(
+        ax,
+        [
+            Patch(facecolor=color, edgecolor="0.4", linewidth=0.6, label=label)
+            for label, color in colors.items()
+        ],
+    )
 
 
 def _path_of(outline: shapely.Geometry) -> Path:
@@ -272,12 +273,11 @@ def _panels(width: float, height: float) -> tuple[Figure, list[Axes]]:
 
     stacked = width > WIDE * height
     if stacked:
-        high = ROW_WIDTH * 0.8 * height / width
-        size = (ROW_WIDTH * 0.8 + 0.8, 3 * (max(high, 0.8) + 1.3) + 0.3)
+        size = (STACK + 0.8, 3 * (max(STACK * height / width, 0.8) + 1.1) + 0.4)
     else:
-        wide = min((ROW_WIDTH - 1.5) / 3, max(LONGEST * width / height, NARROWEST))
+        wide = min(ROW, max(LONGEST * width / height, NARROWEST))
         size = (3 * wide + 1.5, min(wide * height / width, LONGEST) + 2.0)
-    figure = Figure(figsize=size, layout="constrained")
+    figure = Figure(figsize=size, layout="compressed")
     axes = list(figure.subplots(*((3, 1) if stacked else (1, 3))))
     for ax in axes:
         ax.set_xlabel("x [m]", fontsize=9)
@@ -287,18 +287,18 @@ def _panels(width: float, height: float) -> tuple[Figure, list[Axes]]:
     return figure, axes
 
 
-def _draw_queries(
-    routes: Sequence[FoundRoute], failed: Sequence[FailedQuery], *, ax: Axes
-) -> None:
+def _draw_queries(routes: Sequence[FoundRoute], failed: Sequence[FailedQuery], *, ax: Axes) -> None:
     """Draw routes, and a plus and a cross where one was asked for in vain."""
     for number, (label, waypoints, footprint) in enumerate(routes, start=1):
         draw_route(waypoints, footprint=footprint, ax=ax)
-        line = shapely.LineString(np.asarray(waypoints, dtype=np.float64))
+        line = shapely.LineString(
+            np.repeat(as_floats("waypoints", waypoints, (None, 2)), 2, axis=0)
+        )
         # Routes between the same two places have their labels at different shares of the way.
         middle = line.interpolate(number / (len(routes) + 1), normalized=True)
         _write(label, (middle.x, middle.y), ax=ax)
     for label, start, goal in failed:
-        ends = as_floats("failed", [start, goal], (2, 2))
+        ends = np.array([as_floats("start", start, (2,)), as_floats("goal", goal, (2,))])
         ax.plot(*ends.T, color=ROUTE, linewidth=0.9, linestyle=":", zorder=4)
         marks = [
             ax.plot(
@@ -328,19 +328,13 @@ def _legend_below(ax: Axes) -> None:
     figure: Any = ax.figure
     before = ax.get_legend()
     handles = [] if before is None else [handle for handle in before.legend_handles if handle]
-    named = {str(handle.get_label()): handle for handle in reversed(handles)}
+    named = {str(handle.get_label()): handle for handle in handles}
     below = ScaledTranslation(0.0, -LEGEND_DROP, figure.dpi_scale_trans)
     subplots: Any = ax.get_subplotspec()
     room = (figure.get_figwidth() - 1.0) / subplots.get_gridspec().ncols
     ax.legend(
-        handles=list(reversed(named.values())),
-        loc="upper left",
-        bbox_to_anchor=(0.0, 0.0),
-        bbox_transform=ax.transAxes + below,
-        ncols=max(1, int(room / LEGEND_COLUMN)),
-        frameon=False,
-        borderaxespad=0.0,
-        fontsize=8.5,
-        handlelength=1.6,
-        columnspacing=1.2,
-    )
+        handles=list(named.values()),
+        loc="upper left", bbox_to_anchor=(0.0, 0.0), bbox_transform=ax.transAxes + below,
+        ncols=max(1, int(room / LEGEND_COLUMN)), frameon=False, borderaxespad=0.0,
+        fontsize=8.5, handlelength=1.6, columnspacing=1.2,
+    )  # fmt: skip

@@ -115,6 +115,105 @@ def _append_higher(
 ) -> int:
     """Append the higher of two edges, and the other one behind their crossing, if they cross."""
     da, db = a[i] - a[j], b[i] - b[j]
+    crossing = _crossing(da, db, lower, upper)
+    if crossing > lower:
+        i_first = da * np.cos(lower) + db * np.sin(lower) > 0.0
+        first, second = (i, j) if i_first else (j, i)
+        size = _append(lower, crossing, first, low, high, edges, start, size)
+        return _append(crossing, upper, second, low, high, edges, start, size)
+    middle = 0.5 * (lower + upper)
+    higher = i if da * np.cos(middle) + db * np.sin(middle) >= 0.0 else j
+    return _append(lower, upper, higher, low, high, edges, start, size)
+
+
+@njit(cache=True, nogil=True)
+def join_envelopes(
+    low: Floats,
+    high: Floats,
+    edge: Ints,
+    alone: Bools,
+    a: Floats,
+    b: Floats,
+    far_low: Floats,
+    far_high: Floats,
+    far_edge: Ints,
+    far_a: Floats,
+    far_b: Floats,
+) -> tuple[Floats, Floats, Ints, Bools]:
+    """Join the nearest edges and the farthest supports into what bounds freespace.
+
+    Where an edge stands `alone`, it bounds; an edge that does not needs a support, and the nearer
+    of both bounds; where there is no edge, the support does.
+
+    Returns (lower bearing, upper bearing, edge, whether it is a support's), in order.
+    """
+    room = 4 * (low.size + far_low.size) + 4
+    out_low, out_high = np.empty(room), np.empty(room)
+    out_edge, second = np.empty(room, np.int64), np.zeros(room, np.bool_)
+    size, j, here = 0, 0, -np.inf
+    for i in range(low.size + 1):
+        until = low[i] if i < low.size else np.inf
+        while j < far_low.size and far_low[j] < until:  # no edge
+            lower, upper = max(far_low[j], here), min(far_high[j], until)
+            if lower < upper:
+                out_low[size], out_high[size], out_edge[size] = lower, upper, far_edge[j]
+                second[size] = True
+                size += 1
+            if far_high[j] > until:
+                break
+            j += 1
+        if i == low.size:
+            break
+        here = high[i]
+        if alone[edge[i]]:
+            out_low[size], out_high[size], out_edge[size] = low[i], high[i], edge[i]
+            size += 1
+            continue
+        while j < far_low.size and far_low[j] < here:
+            lower, upper = max(far_low[j], low[i]), min(far_high[j], here)
+            if lower < upper:
+                size = _append_nearer(
+                    lower, upper, edge[i], far_edge[j], a[edge[i]] - far_a[far_edge[j]],
+                    b[edge[i]] - far_b[far_edge[j]], out_low, out_high, out_edge, second, size,
+                )  # fmt: skip
+            if far_high[j] > here:
+                break
+            j += 1
+    return out_low[:size], out_high[:size], out_edge[:size], second[:size]
+
+
+@njit(cache=True, nogil=True)
+def _append_nearer(
+    lower: float,
+    upper: float,
+    edge: int,
+    support: int,
+    da: float,
+    db: float,
+    low: Floats,
+    high: Floats,
+    edges: Ints,
+    second: Bools,
+    size: int,
+) -> int:
+    """Append the nearer of an edge and a support, and the other behind their crossing.
+
+    At bearing t the edge is nearer where da cos t + db sin t is above zero.
+    """
+    cut = _crossing(da, db, lower, upper)
+    for begin, end in ((lower, cut), (cut, upper)):
+        if begin < end:
+            middle = 0.5 * (begin + end)
+            second[size] = da * np.cos(middle) + db * np.sin(middle) < 0.0
+            low[size], high[size] = begin, end
+            edges[size] = support if second[size] else edge
+            size += 1
+    return size
+
+
+@njit(cache=True, nogil=True)
+def _crossing(da: float, db: float, lower: float, upper: float) -> float:
+    """Return where da cos t + db sin t changes its sign between two bearings, or the lower one."""
     at_lower = da * np.cos(lower) + db * np.sin(lower)
     at_upper = da * np.cos(upper) + db * np.sin(upper)
     if (at_lower < 0.0) != (at_upper < 0.0) and at_lower != 0.0 and at_upper != 0.0:
@@ -124,39 +223,5 @@ def _append_higher(
         elif crossing > upper:
             crossing -= np.pi
         if lower < crossing < upper:
-            first, second = (i, j) if at_lower > 0.0 else (j, i)
-            size = _append(lower, crossing, first, low, high, edges, start, size)
-            return _append(crossing, upper, second, low, high, edges, start, size)
-    middle = 0.5 * (lower + upper)
-    higher = i if da * np.cos(middle) + db * np.sin(middle) >= 0.0 else j
-    return _append(lower, upper, higher, low, high, edges, start, size)
-
-
-@njit(cache=True, nogil=True)
-def fill_gaps(
-    low: Floats, high: Floats, edge: Ints, gap_low: Floats, gap_high: Floats, gap_edge: Ints
-) -> tuple[Floats, Floats, Ints, Bools]:
-    """Put pieces of a second envelope where the first has none.
-
-    Returns (lower bearing, upper bearing, edge, from the second envelope), in order.
-    """
-    room = 2 * (low.size + gap_low.size) + 2
-    out_low, out_high = np.empty(room), np.empty(room)
-    out_edge, second = np.empty(room, np.int64), np.zeros(room, np.bool_)
-    size, j, here = 0, 0, -np.inf
-    for i in range(low.size + 1):
-        until = low[i] if i < low.size else np.inf
-        while j < gap_low.size and gap_low[j] < until:
-            lower, upper = max(gap_low[j], here), min(gap_high[j], until)
-            if lower < upper:
-                out_low[size], out_high[size], out_edge[size] = lower, upper, gap_edge[j]
-                second[size] = True
-                size += 1
-            if gap_high[j] > until:
-                break
-            j += 1
-        if i < low.size:
-            out_low[size], out_high[size], out_edge[size] = low[i], high[i], edge[i]
-            size += 1
-            here = high[i]
-    return out_low[:size], out_high[:size], out_edge[:size], second[:size]
+            return float(crossing)
+    return lower

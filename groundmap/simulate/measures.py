@@ -10,8 +10,8 @@ from scipy.ndimage import binary_dilation, distance_transform_edt
 from scipy.spatial import cKDTree
 
 from groundmap.arrays import Bools, Floats
-from groundmap.judge import NEAR, near_nonfree
-from groundmap.simulate.truth import Truth
+from groundmap.judge import NEAR, cells_around, near_nonfree
+from groundmap.simulate.truth import HAIR, Truth
 from groundmap.window import CellState, GridWindow
 
 JUDGED_RANGE = 10.0  # [m], boundaries farther from every viewpoint are not judged
@@ -54,7 +54,7 @@ def measure(window: GridWindow, truth: Truth) -> Measures:
     judged = truth.visible | _cells_holding(window, truth.surfaces)
     false = free & (truth.nonfree | ~truth.in_line)
     depths = _depths(window, truth)[false]
-    borders = _borders(window, nonfree & judged, free, truth)
+    borders = _borders(window, nonfree, free, truth)
     return Measures(
         free_recall=_share((free & open_ground).sum(), open_ground.sum()),
         free_precision=_share((free & judged & ~truth.nonfree).sum(), (free & judged).sum()),
@@ -82,8 +82,9 @@ def _mean(values: Floats | Bools) -> float | None:
 def _cells_holding(window: GridWindow, points: Floats) -> Bools:
     held = np.zeros(window.count.shape, dtype=np.bool_)
     if len(points):
-        cells = window.world_to_cell(points)
-        held[tuple(cells[window.contains(cells)].T)] = True
+        cells, distance = cells_around(window, points, 2.0 * HAIR)
+        near = window.contains(cells) & (distance <= 2.0 * HAIR)
+        held[tuple(cells[near].T)] = True
     return held
 
 
@@ -93,6 +94,8 @@ def _depths(window: GridWindow, truth: Truth) -> Floats:
     From its centre to the border of the nearest cell that is truly free and in line of a view.
     """
     wrong = truth.nonfree | ~truth.in_line
+    if wrong.all():  # the transform has nothing to measure to
+        return np.full(wrong.shape, np.inf)
     centre_to_centre = distance_transform_edt(wrong, sampling=window.resolution)
     depths: Floats = np.maximum(centre_to_centre - 0.5 * window.resolution, 0.0)
     return depths
@@ -118,6 +121,10 @@ def _borders(window: GridWindow, nonfree: Bools, free: Bools, truth: Truth) -> F
     if not len(centres) or truth.obstacles.is_empty:
         return np.empty(0)
     near, _ = cKDTree(truth.viewpoints).query(centres)
+    in_view = truth.visible[beside]
+    if len(truth.surfaces):
+        in_view |= cKDTree(truth.surfaces).query(centres)[0] <= 1.0
+    near[~in_view] = np.inf
     outline = truth.obstacles.boundary
     shapely.prepare(outline)
     distances: Floats = shapely.distance(shapely.points(centres[near <= JUDGED_RANGE]), outline)

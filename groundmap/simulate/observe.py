@@ -103,9 +103,7 @@ class _Scene:
         """
         repeats = np.array([0.0, *(solid.repeat for solid in self.world.solids)])
         disparity_px = (seen.pixels[..., 0] - seen.pixels[..., 1]).mean(axis=1)
-        periods: Floats = (
-            repeats[marks.owner[seen.ids] + 1] * disparity_px / self.settings.baseline
-        )
+        periods: Floats = repeats[marks.owner[seen.ids] + 1] * disparity_px / self.settings.baseline
         return periods
 
     def _look(self, places: Floats, there: Bools) -> tuple[Floats, Bools]:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from groundmap.arrays import as_floats
+from groundmap.arrays import as_floats, check_finite
 from groundmap.errors import InputError
 from groundmap.simulate.world import Solid
 
@@ -37,7 +37,11 @@ def wall(points: npt.ArrayLike, *, thickness: float = 0.2) -> shapely.Polygon:
     >>> wall([(0, 0), (5, 0), (5, 3)], thickness=0.2).bounds
     (0.0, -0.1, 5.1, 3.0)
     """
-    line = shapely.LineString(as_floats("wall", points, (None, 2)))
+    corners = as_floats("wall", points, (None, 2))
+    check_finite("wall", corners)
+    if len(corners) < 2:
+        raise InputError("wall", "two corners or more [m]", str(len(corners)))
+    line = shapely.LineString(corners)
     outline: shapely.Polygon = line.buffer(
         thickness / 2.0, cap_style="flat", join_style="mitre", single_sided=False
     )

@@ -182,11 +182,12 @@ def touched_cells(
     cells = np.argwhere(np.ones(shape, dtype=np.bool_))
     centres = centres_of(cells, origin, resolution)
     touched: Bools = shapely.contains_xy(obstacles, centres)
-    on_outline = np.zeros(shape, dtype=np.bool_)
-    samples = cells_of(_along_outlines(obstacles, 0.5 * resolution), origin, resolution)
-    inside = ((samples >= 0) & (samples < shape)).all(axis=1)
+    on_outline = np.zeros(np.add(shape, 2), dtype=np.bool_)  # and a rim of one cell
+    samples = 1 + cells_of(_along_outlines(obstacles, 0.5 * resolution), origin, resolution)
+    inside = ((samples >= 0) & (samples < on_outline.shape)).all(axis=1)
     on_outline[tuple(samples[inside].T)] = True
-    near = np.flatnonzero(binary_dilation(on_outline, structure=np.ones((3, 3))))
+    beside = binary_dilation(on_outline, structure=np.ones((3, 3)))
+    near = np.flatnonzero(beside[1:-1, 1:-1])
     half = 0.5 * resolution - HAIR
     x, y = centres[near].T
     boxes = shapely.box(x - half, y - half, x + half, y + half)

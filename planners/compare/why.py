@@ -12,6 +12,7 @@ from shapely.affinity import rotate
 
 from groundmap import Features, GroundMapper, GroundPlane, View
 from groundmap.arrays import Floats, Ints
+from groundmap.errors import InputError
 from groundmap.settings import MapperSettings
 from groundmap.simulate import Drive, SensorSettings, Solid, World, observe, strew
 from groundmap.simulate.drive import to_transforms
@@ -27,8 +28,9 @@ WALL_TOP = 2.0  # [m]
 ROOM_FROM_OBSTACLES = 0.5  # [m], around the camera and the way ahead of it
 CLEAR_AHEAD = 3.0  # [m], so that there is something to see
 MARGIN = 1.0  # [m] around a room that is judged, too: nothing there is free
-TEXTURE = 300.0  # [1/m²], so that every view has the most points asked for
-LINES = 20.0  # [1/m²], and segments
+TEXTURE, LINES = 1000.0, 60.0  # [1/m²], points and segments: enough to choose from everywhere
+BUCKETS_PX = 12.0, 32.0  # sides of the squares of the image that hold one point, one segment
+ALL = 10**6  # features
 
 
 class Curve(NamedTuple):
@@ -65,9 +67,9 @@ def compare_recall(
 ) -> Curves:
     """Map single views of random rooms, by triangulation and by ray casting.
 
-    Within a room all maps are made of the same view; fewer features are a part of more, drawn
-    without regard to where they are. Points and segments lie equally densely on walls, boxes and
-    ground. The ray caster is given the points that the fan is given.
+    Within a room all maps are made of the same view. Its features are spread evenly over the
+    image, as detectors spread theirs; fewer features are a part of more. The ray caster is given
+    the points that the fan is given. Both know the ground plane.
 
     Parameters
     ----------
@@ -79,13 +81,24 @@ def compare_recall(
         Wraps the list of rooms, to show progress.
     **settings
         `groundmap.settings.MapperSettings`.
+
+    Raises
+    ------
+    InputError
+        No room.
+
+    Notes
+    -----
+    A ray is as wide as a cell, so what rays find depends on ``resolution``; triangles do not.
     """
+    if rooms < 1:
+        raise InputError("rooms", "1 or more", str(rooms))
     sensor = SensorSettings(
         pixel_noise_px=pixel_noise_px,
         missing=0.0,
         false_matches=0.0,
-        max_points=max(POINTS),
-        max_segments=max(SEGMENTS),
+        max_points=ALL,
+        max_segments=ALL,
     )
     figures = [
         _figures(_scene(seed, number, sensor, MapperSettings(**settings)), settings)
@@ -126,8 +139,8 @@ def _scene(seed: int, number: int, sensor: SensorSettings, settings: MapperSetti
     (view,) = observe(world, strew(world, rng), stop, sensor, seed=int(rng.integers(2**31)))
     view = replace(
         view,
-        points=_shuffled(view.points, rng),
-        segments=_shuffled(view.segments, rng),
+        points=_evenly(view.points, sensor.fx / BUCKETS_PX[0], rng),
+        segments=_evenly(view.segments, sensor.fx / BUCKETS_PX[1], rng),
         plane=GroundPlane.below_camera(sensor.rig, sensor.camera_height),
     )
     window = _judged(GroundMapper(**settings.model_dump()), world)
@@ -145,8 +158,16 @@ def _pose(world: World, rng: np.random.Generator) -> Floats:
             return np.array([*place, yaw])
 
 
-def _shuffled(features: Features, rng: np.random.Generator) -> Features:
-    return features.select(rng.permutation(len(features)))
+def _evenly(features: Features, buckets: float, rng: np.random.Generator) -> Features:
+    """Return one feature of each square of the image, in random order.
+
+    `buckets` is the number of squares to a focal length.
+    """
+    shuffled = features.select(rng.permutation(len(features)))
+    middle = shuffled.xyz.reshape(len(shuffled), -1, 3).mean(axis=1)
+    bucket = np.floor(buckets * middle[:, :2] / middle[:, 2:])
+    _, first = np.unique(bucket, axis=0, return_index=True)
+    return shuffled.select(rng.permutation(first))
 
 
 def _figures(scene: _Scene, settings: dict[str, Any]) -> tuple[Floats, Floats, Floats]:

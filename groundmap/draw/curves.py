@@ -1,0 +1,68 @@
+"""Curves: what single views show, by the number of their features."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from groundmap.arrays import as_floats, check_finite
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+
+# Apart in greyscale, too: by marker and by dashes.
+STYLES = (("#1f5f8b", "o", "-"), ("#221122", "s", "-"), ("#d08030", "^", "--"))
+RECALL, FALSE = "truly free and in sight: free on the map", "free on the map: wrong by over 0.3 m"
+NEAREST = 0.13  # of a decade: ticks nearer than that to the one before have no room
+
+
+def draw_curves(curves: Mapping[str, npt.ArrayLike], *, ax: Sequence[Axes]) -> list[Artist]:
+    """Draw which share of freespace is found, and which share of what is found is false.
+
+    Parameters
+    ----------
+    curves : mapping of str to array_like, shape (3, n)
+        By the name to show: numbers of features, share of freespace found, share of it false.
+    ax : two matplotlib axes
+
+    Raises
+    ------
+    InputError
+        Arrays of another shape, or numbers that are not finite.
+    """
+    lines: list[Artist] = []
+    values = {name: as_floats(name, rows, (3, None)) for name, rows in curves.items()}
+    for number, (name, rows) in enumerate(values.items()):
+        check_finite(name, rows)
+        color, marker, dashes = STYLES[number % len(STYLES)]
+        for axes, shares in zip(ax, rows[1:], strict=True):
+            lines += axes.plot(
+                rows[0], shares, color=color, marker=marker, linestyle=dashes,
+                markersize=5, linewidth=1.6, label=name,
+            )  # fmt: skip
+    counts = np.unique(np.concatenate([np.empty(0), *(rows[0] for rows in values.values())]))
+    for axes, title in zip(ax, (RECALL, FALSE), strict=True):
+        _count_axis(axes, counts)
+        axes.set_title(title, fontsize=10, loc="left")
+        axes.set_ylabel("share")
+        axes.legend(fontsize=9)
+    ax[0].set_ylim(top=1.0)
+    ax[1].set_ylim(bottom=0.0)
+    return lines
+
+
+def _count_axis(ax: Axes, counts: npt.NDArray[np.float64]) -> None:
+    """Make x logarithmic, with the counts themselves at the ticks that there is room for."""
+    ticks: list[float] = []
+    for count in counts.tolist():
+        if not ticks or np.log10(count / ticks[-1]) >= NEAREST:
+            ticks.append(count)
+    ax.set_xscale("log")
+    ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    ax.set_xticks([], minor=True)
+    ax.set_xlabel("features in the view")
+    ax.grid(color="0.9", linewidth=0.8)

@@ -1,0 +1,114 @@
+"""What the lines of sight to features say: of surfaces that they pass, of the ground below them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from groundmap.arrays import Bools, Floats
+from groundmap.heights import FlatView
+from groundmap.kernels.lines import gap_chords, passed_through
+from groundmap.settings import MapperSettings
+from groundmap.surfaces import SurfaceKind, Surfaces
+from groundmap.uncertainty import MODELS
+
+BEHIND = 0.05  # [m], a feature this little behind a surface is on it
+# How many features make up a surface; if more are seen through it, it hides nothing.
+MADE_OF = {
+    SurfaceKind.SEGMENT: 2.0,
+    SurfaceKind.LINK: 2.0,
+    SurfaceKind.LONE: 1.0,
+    SurfaceKind.DOUBTFUL: 1.0,
+}
+
+
+class Contradictions(NamedTuple):
+    """Surfaces against the features that are seen through them."""
+
+    against: Floats  #: shape (s,), features behind it whose line of sight passes below its top
+    belief: Floats  #: shape (s,), 1, or for an outnumbered surface the share of those who make it
+    features: int  #: that are seen through any surface
+
+    @property
+    def hiding(self) -> Bools:
+        """Which surfaces hide what is behind them, shape (s,): those that are not outnumbered."""
+        hiding: Bools = self.belief == 1.0
+        return hiding
+
+
+def contradictions(flat: FlatView, surfaces: Surfaces) -> Contradictions:
+    """Count, for each surface, the features that are seen through it.
+
+    A feature that is seen *over* a surface is behind it, as it should be; one whose line of sight
+    passes below its top contradicts it. A surface that more features contradict than make it up
+    is most likely the ghost of a false match.
+    """
+    firm = surfaces.kind != SurfaceKind.DOUBTFUL
+    against = np.zeros(len(firm))
+    against[firm], features = _seen_through(flat, surfaces, firm)
+    against[~firm], _ = _seen_through(flat, surfaces, ~firm)
+    made_of = np.array([MADE_OF[kind] for kind in SurfaceKind])[surfaces.kind]
+    belief = np.where(against > made_of, made_of / (made_of + against), 1.0)
+    return Contradictions(against, belief, features)
+
+
+def _seen_through(flat: FlatView, surfaces: Surfaces, which: Bools) -> tuple[Floats, int]:
+    """Return how many features are seen through each of some surfaces, and through any of them."""
+    points = np.concatenate([flat.points, flat.supports])
+    heights = np.concatenate([flat.heights, flat.support_heights])
+    bearings = np.arctan2(points[:, 1], points[:, 0])
+    order = np.argsort(bearings, kind="stable")
+    feature = flat.feature[order]
+    _, number, rows = np.unique(feature, return_inverse=True, return_counts=True)
+    against, passes = np.zeros(int(which.sum())), np.zeros(len(order), dtype=np.bool_)
+    passed_through(
+        surfaces.ends[which],
+        surfaces.reach[which],
+        surfaces.tops[which],
+        bearings[order],
+        points[order],
+        heights[order],
+        1.0 / rows[number],  # the ends of a segment are one feature
+        flat.camera_height,
+        BEHIND,
+        against,
+        passes,
+    )
+    return against, len(np.unique(feature[passes]))
+
+
+def support_chords(flat: FlatView, settings: MapperSettings) -> Floats:
+    """Return the chords that freespace reaches to where no surface is, shape (k, 2, 2) [m, view].
+
+    Each ground feature at range r vouches for the bearings within min(support_width / r,
+    support_angle), out to r. Two lines of sight vouch for what is between them as far as both
+    reach and no more than `sight_gap` lies between: nothing wider fits in unseen. Lines to
+    obstacles count as far as before the obstacle, if they come down low enough.
+    """
+    return np.concatenate([_single_chords(flat.supports, settings), _gaps(flat, settings)])
+
+
+def _single_chords(supports: Floats, settings: MapperSettings) -> Floats:
+    radius = np.hypot(supports[:, 0], supports[:, 1])
+    half = np.minimum(settings.support_width / radius, settings.support_angle)
+    ray = supports / radius[:, None]
+    cos, sin = np.cos(half)[:, None], np.sin(half)[:, None]
+    side = np.stack([-ray[:, 1], ray[:, 0]], axis=1)
+    return radius[:, None, None] * np.stack(
+        [ray * cos - side * sin, ray * cos + side * sin], axis=1
+    )
+
+
+def _gaps(flat: FlatView, settings: MapperSettings) -> Floats:
+    low = flat.heights <= settings.grant_height * flat.camera_height
+    points = np.concatenate([flat.supports, flat.points[low]])
+    ranges = np.hypot(points[:, 0], points[:, 1])
+    model = MODELS[settings.uncertainty]
+    ranges[len(flat.supports) :] -= settings.spread_sigmas * model.sigma(
+        flat.points[low], flat.covariance[low]
+    )
+    bearings = np.arctan2(points[:, 1], points[:, 0])
+    order = np.argsort(bearings, kind="stable")
+    order = order[ranges[order] > settings.min_range]
+    return gap_chords(bearings[order], ranges[order], settings.sight_gap)

@@ -1,0 +1,54 @@
+"""Smoothing: features that may lie on one surface tell each other where it is.
+
+Each feature's range is as noisy as its disparity, and the nearest of many noisy features bounds
+what is seen: a wall would come the nearer, the more features it has.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from groundmap.heights import FlatView
+from groundmap.kernels.smooth import smooth_along_rays
+from groundmap.settings import MapperSettings
+
+GATE = 2.0  # standard deviations of the difference: what is farther apart is two surfaces
+SUREST = 0.5  # of its own standard deviation: a real surface is not quite straight
+LEAST_SIGMA = 1e-9  # [1/m]
+
+
+def smoothed(flat: FlatView, settings: MapperSettings) -> FlatView:
+    """Move obstacle features along their lines of sight to where their neighbours agree.
+
+    Around each feature a straight surface is fitted to those within `smoothing` metres across the
+    line of sight and two standard deviations along it; alone or in pairs, features stay where
+    they are. Their covariance shrinks accordingly, to a quarter at most. Ground features are left
+    alone.
+    """
+    if settings.smoothing == 0 or len(flat.points) == 0:
+        return flat
+    radius = np.hypot(flat.points[:, 0], flat.points[:, 1])
+    ray = flat.points / radius[:, None]
+    along = np.einsum("ni,nij,nj->n", ray, flat.covariance, ray)
+    sigma = np.maximum(np.sqrt(along) / radius**2, LEAST_SIGMA)
+    bearings = np.arctan2(flat.points[:, 1], flat.points[:, 0])
+    order = np.argsort(bearings, kind="stable")
+    inverse, deviation = np.empty(len(order)), np.empty(len(order))
+    smooth_along_rays(
+        bearings[order],
+        1.0 / radius[order],
+        sigma[order],
+        settings.smoothing,
+        GATE,
+        inverse,
+        deviation,
+    )
+    back = np.empty_like(order)
+    back[order] = np.arange(len(order))
+    stretch = 1.0 / (inverse[back] * radius)  # new range / old one
+    shrink = np.clip(deviation[back] / sigma, SUREST, 1.0)
+    return flat._replace(
+        points=flat.points * stretch[:, None],
+        covariance=flat.covariance * (shrink**2)[:, None, None],
+        heights=flat.camera_height + (flat.heights - flat.camera_height) * stretch,
+    )
