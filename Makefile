@@ -44,7 +44,7 @@ wheel-test: $(READY) ## Build the wheel, install it alone, run the tests against
 	rm -rf dist
 	$(BIN)/python -m build --wheel --no-isolation --outdir dist
 	$(BIN)/python tools/install_wheel.py dist $(WHEEL_VENV)
-	cd $(WHEEL_VENV) && bin/pytest -n $(WORKERS) -c '$(CURDIR)/pyproject.toml' --installed '$(CURDIR)/tests' --pyargs groundmap planners
+	cd $(WHEEL_VENV) && bin/pytest -n $(WORKERS) -c '$(CURDIR)/pyproject.toml' --installed '$(CURDIR)/tests' '$(CURDIR)/scenarios' --pyargs groundmap planners
 
 clean: ## Remove everything that the other targets made
 	rm -rf .venv $(WHEEL_VENV) dist groundmap-demo .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

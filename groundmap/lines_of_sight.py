@@ -13,7 +13,9 @@ from groundmap.settings import MapperSettings
 from groundmap.surfaces import SurfaceKind, Surfaces
 from groundmap.uncertainty import MODELS
 
+BELOW = 0.1  # [m], sight that passes this little below a top may have passed over it
 BEHIND = 0.05  # [m], a feature this little behind a surface is on it
+THIN = 0.02  # [m], half-width of the thinnest pole: beside it, one sees past a lone point
 # How many features make up a surface; if more are seen through it, it hides nothing.
 MADE_OF = {
     SurfaceKind.SEGMENT: 2.0,
@@ -26,7 +28,7 @@ MADE_OF = {
 class Contradictions(NamedTuple):
     """Surfaces against the features that are seen through them."""
 
-    against: Floats  #: shape (s,), features behind it whose line of sight passes below its top
+    against: Floats  #: shape (s,), features behind it that are seen below its top
     belief: Floats  #: shape (s,), 1, or for an outnumbered surface the share of those who make it
     features: int  #: that are seen through any surface
 
@@ -46,14 +48,16 @@ def contradictions(flat: FlatView, surfaces: Surfaces) -> Contradictions:
     """
     firm = surfaces.kind != SurfaceKind.DOUBTFUL
     against = np.zeros(len(firm))
-    against[firm], features = _seen_through(flat, surfaces, firm)
-    against[~firm], _ = _seen_through(flat, surfaces, ~firm)
+    against[firm], features = _seen_through(flat, surfaces, firm, BELOW)
+    against[~firm], _ = _seen_through(flat, surfaces, ~firm, 0.0)
     made_of = np.array([MADE_OF[kind] for kind in SurfaceKind])[surfaces.kind]
     belief = np.where(against > made_of, made_of / (made_of + against), 1.0)
     return Contradictions(against, belief, features)
 
 
-def _seen_through(flat: FlatView, surfaces: Surfaces, which: Bools) -> tuple[Floats, int]:
+def _seen_through(
+    flat: FlatView, surfaces: Surfaces, which: Bools, below: float
+) -> tuple[Floats, int]:
     """Return how many features are seen through each of some surfaces, and through any of them."""
     points = np.concatenate([flat.points, flat.supports])
     heights = np.concatenate([flat.heights, flat.support_heights])
@@ -63,7 +67,7 @@ def _seen_through(flat: FlatView, surfaces: Surfaces, which: Bools) -> tuple[Flo
     _, number, rows = np.unique(feature, return_inverse=True, return_counts=True)
     against, passes = np.zeros(int(which.sum())), np.zeros(len(order), dtype=np.bool_)
     passed_through(
-        surfaces.ends[which],
+        _solid_ends(surfaces)[which],
         surfaces.reach[which],
         surfaces.tops[which],
         bearings[order],
@@ -72,10 +76,20 @@ def _seen_through(flat: FlatView, surfaces: Surfaces, which: Bools) -> tuple[Flo
         1.0 / rows[number],  # the ends of a segment are one feature
         flat.camera_height,
         BEHIND,
+        below,
         against,
         passes,
     )
     return against, len(np.unique(feature[passes]))
+
+
+def _solid_ends(surfaces: Surfaces) -> Floats:
+    """Return the ends of surfaces, a lone point's as near to it as the thinnest pole's."""
+    middle = surfaces.ends.mean(axis=1, keepdims=True)
+    lone = surfaces.discs > 0
+    share = np.where(lone, np.minimum(THIN / np.where(lone, surfaces.discs, 1.0), 1.0), 1.0)
+    ends: Floats = middle + share[:, None, None] * (surfaces.ends - middle)
+    return ends
 
 
 def support_chords(flat: FlatView, settings: MapperSettings) -> Floats:

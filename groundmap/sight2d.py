@@ -11,7 +11,7 @@ from groundmap.heights import FlatView
 from groundmap.kernels.envelope import join_envelopes, upper_envelope
 from groundmap.lines_of_sight import Contradictions, contradictions, support_chords
 from groundmap.settings import MapperSettings
-from groundmap.surfaces import RADIAL, Surfaces
+from groundmap.surfaces import RADIAL, SurfaceKind, Surfaces
 
 NO_SURFACE = -1
 
@@ -70,6 +70,7 @@ def visible_freespace(flat: FlatView, surfaces: Surfaces, settings: MapperSettin
     farthest = upper_envelope(grounds.t0, grounds.t1, -grounds.a, -grounds.b)
     lowest = surfaces.bottoms[walls.row].min(axis=1)
     granting = lowest <= settings.grant_height * flat.camera_height
+    granting &= surfaces.kind[walls.row] != SurfaceKind.DOUBTFUL
     low, high, number, supported = join_envelopes(
         *nearest, granting, walls.a, walls.b, *farthest, grounds.a, grounds.b
     )

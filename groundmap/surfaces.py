@@ -15,6 +15,7 @@ from groundmap.triangulation import Mesh
 from groundmap.uncertainty import MODELS
 
 RADIAL = 1e-9  # [rad], an edge that spans less is seen end-on
+HALO = 0.3  # of a believed link: as far as that, what a feature is on may go on beside it
 FRONTIER = 255  # the kind of an edge that is no surface
 SHARE_OF_FOOTPRINT = 0.8  # a link shorter than this share of the narrowest robot stops that robot
 
@@ -25,7 +26,7 @@ class SurfaceKind(IntEnum):
     SEGMENT = 0
     LINK = 1
     LONE = 2
-    DOUBTFUL = 3  #: a link too long to believe, but not by far: it ends sight and is not drawn
+    DOUBTFUL = 3  #: a link too long to believe, but not by far, or where a surface may go on
 
 
 class Surfaces(NamedTuple):
@@ -78,7 +79,9 @@ def find_surfaces(flat: FlatView, mesh: Mesh, settings: MapperSettings) -> Surfa
     the features' height bands overlap. A vertex with neither is a disc of max(cell / 2, sigma), but
     not larger than such a link is long.
     All other edges are frontiers: they grant nothing, and bound nothing unless they are doubtful,
-    which they are up to `doubt` times the length that would be believed.
+    which they are up to `doubt` times the length that would be believed. Doubtful, too, is the
+    place beside a feature: what it is on may go on there. What is doubtful ends sight unless
+    features are seen through it, and is not drawn.
     """
     vertices = _vertices(flat, mesh, settings)
     kinds = _kinds(vertices, mesh, settings)
@@ -97,6 +100,9 @@ def find_surfaces(flat: FlatView, mesh: Mesh, settings: MapperSettings) -> Surfa
     # However unsure a point is, its disc hides no more than a link to a neighbour would.
     bound = _longest_link(np.hypot(discs.xy[:, 0], discs.xy[:, 1]), settings)
     radius = np.maximum(0.5 * settings.resolution, np.minimum(discs.sigma, bound))
+    beside = _beside(vertices, ~near, settings)
+    ends = _Vertices(*(np.concatenate(pair) for pair in zip(ends, beside, strict=True)))
+    kinds = np.concatenate([kinds, np.full(len(beside.xy), SurfaceKind.DOUBTFUL)])
     everything = np.concatenate([ends.xy, _silhouettes(discs.xy, radius)])
     core = np.full(len(radius), MODELS[settings.uncertainty].core_radius(settings.resolution))
     cores = np.concatenate([ends.xy, _silhouettes(discs.xy, core)])
@@ -181,6 +187,17 @@ def _away_from_viewpoint(
     inside_it = ~whole & ~before & ~after
     blocked = int((inside_it & (kinds < SurfaceKind.DOUBTFUL)).sum())
     return _Pieces(edges[number], span), kinds[number], blocked
+
+
+def _beside(vertices: _Vertices, which: Bools, settings: MapperSettings) -> _Vertices:
+    """Return where what a feature is on may go on: to both sides, across the line of sight."""
+    some = _Vertices(*(values[which] for values in vertices))
+    radius = np.hypot(some.xy[:, 0], some.xy[:, 1])
+    half = HALO * _longest_link(radius, settings)
+    left, right = np.moveaxis(_silhouettes(some.xy, half), 1, 0)
+    halves = np.concatenate([np.stack([left, some.xy], axis=1), np.stack([some.xy, right], axis=1)])
+    others = (np.concatenate([_twice(values)] * 2) for values in some[1:])
+    return _Vertices(halves, *others)
 
 
 def _discs(vertices: _Vertices, lone: Bools, ends: _Vertices) -> _Vertices:

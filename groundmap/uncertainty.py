@@ -8,15 +8,16 @@ import numpy as np
 
 from groundmap.arrays import Floats
 
-PEAK = 6.0  # z on a surface, of that around it
+PEAK = 4.0  # z on a surface, of that around it
 
 
 class Ellipsoid:
     """The third solution of the paper: a constant-density ellipse along the feature's covariance.
 
     Around the surface, z is such that a ray through the spread adds up to one cell of surface. On
-    the surface itself it is six times as much, but 1 at most: 1 up to a standard deviation of one
-    and a half cells, and less the less is known of where the surface is.
+    the surface itself it is four times as much, but 1 at most: with a spread of two standard
+    deviations, 1 up to a standard deviation of one cell, and less the less is known of where the
+    surface is.
     """
 
     name: ClassVar[str] = "ellipsoid"

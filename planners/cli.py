@@ -17,6 +17,7 @@ from planners.commands.info import info_command
 from planners.commands.map import map_command
 from planners.commands.plan import plan_command
 from planners.commands.plot import plot_command
+from planners.commands.scenario import scenario_app
 from planners.console import say
 from planners.errors import NoRouteError, PlanningError
 
@@ -36,6 +37,7 @@ app.command("plot")(plot_command)
 app.command("info")(info_command)
 app.command("convert")(convert_command)
 app.command("evaluate")(evaluate_command)
+app.add_typer(scenario_app)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

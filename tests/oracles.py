@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from itertools import combinations
 from typing import TypeAlias
 
 import numpy as np
@@ -13,6 +15,7 @@ from groundmap.arrays import Bools, Floats, Ints
 from groundmap.evidence import Evidence
 from groundmap.heights import FlatView
 from groundmap.sight2d import SightFan
+from groundmap.surfaces import Surfaces
 from groundmap.triangulation import Mesh
 
 Cell: TypeAlias = tuple[int, int]
@@ -139,6 +142,74 @@ def support_chords(supports: Floats, width: float, angle: float) -> Floats:
     both = bearing[:, None] + np.stack([-half, half], axis=1)
     chords: Floats = radius[:, None, None] * np.stack([np.cos(both), np.sin(both)], axis=-1)
     return chords
+
+
+def gap_chords(bearings: Floats, ranges: Floats, widest: float) -> Floats:
+    """Chord of each two lines of sight, neighbours or not: as far as both and the gap let it be."""
+    pairs = list(combinations(range(len(bearings)), 2))
+    i, j = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+    i, j = np.where(bearings[i] < bearings[j], (i, j), (j, i))
+    gap = bearings[j] - bearings[i]
+    i, j, gap = (values[(gap > 1e-9) & (gap < 1.5)] for values in (i, j, gap))
+    reached = np.minimum(np.minimum(ranges[i], ranges[j]), widest / 2 / np.sin(gap / 2))
+    both = np.stack([bearings[i], bearings[j]], axis=1)
+    chords: Floats = reached[:, None, None] * np.stack([np.cos(both), np.sin(both)], axis=-1)
+    return chords
+
+
+def farthest(chords: Floats, bearings: Floats) -> Floats:
+    """Range of the farthest edge at each bearing; 0 where there is none."""
+    inverse = inverse_ranges(chords, bearings)
+    ranges = np.where(inverse > 0, 1.0 / np.where(inverse > 0, inverse, 1.0), 0.0)
+    found: Floats = ranges.max(axis=0, initial=0.0)
+    return found
+
+
+def sight_ranges(walls: Floats, granting: Bools, chords: Floats, bearings: Floats) -> Floats:
+    """How far freespace is seen at each bearing; 0 where nothing is.
+
+    The nearest wall ends sight. If it grants nothing, or there is none, the chords do too.
+    """
+    inverse = inverse_ranges(walls, bearings)
+    inverse = np.concatenate([inverse, np.full((1, len(bearings)), 0.0)])
+    nearest = inverse.argmax(axis=0)
+    walled = nearest < len(walls)
+    wall = np.where(walled, 1.0 / np.where(walled, inverse.max(axis=0), 1.0), np.inf)
+    granted = np.append(granting, False)[nearest]
+    ranges: Floats = np.where(granted, wall, np.minimum(wall, farthest(chords, bearings)))
+    return ranges
+
+
+def counted_against(
+    flat: FlatView, surfaces: Surfaces, slack: float
+) -> tuple[Floats, list[set[int]]]:
+    """For each surface, how many features are seen through it, by their shares; and which ones.
+
+    By `slack`, a share of its length, a surface is taken to be longer (or shorter) at either end.
+    Surfaces across the seam, behind the camera, and those seen end-on are passed by nothing.
+    """
+    places = np.concatenate([flat.points, flat.supports]).tolist()
+    heights = [*flat.heights.tolist(), *flat.support_heights.tolist()]
+    rows = Counter(flat.feature.tolist())
+    against, which = np.zeros(len(surfaces.ends)), [set[int]() for _ in surfaces.ends]
+    for s, (first, last) in enumerate(surfaces.ends):
+        if np.arctan2(*last[::-1]) - np.arctan2(*first[::-1]) < 1e-9:
+            continue
+        for (x, y), height, feature in zip(places, heights, flat.feature.tolist(), strict=True):
+            sides = np.array([(x, first[0] - last[0]), (y, first[1] - last[1])])
+            if np.linalg.det(sides) == 0.0:
+                continue
+            share, t = np.linalg.solve(sides, first)  # share (x, y) = first + t (last - first)
+            if share <= 0 or not -slack <= t <= 1 + slack:
+                continue
+            reach, top = (
+                (1 - t) * pair[0] + t * pair[1] for pair in (surfaces.reach[s], surfaces.tops[s])
+            )
+            behind = np.hypot(x, y) * (1 - share) > 2 * reach + 0.05
+            if behind and (1 - share) * flat.camera_height + share * height < top:
+                against[s] += 1 / rows[feature]
+                which[s].add(feature)
+    return against, which
 
 
 def triangles_of(fan: SightFan) -> list[shapely.Polygon]:

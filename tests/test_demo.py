@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.util
 import json
 import shlex
@@ -16,9 +17,12 @@ import shapely
 from scipy import ndimage
 
 from command_line import Ran, run
-from groundmap import CellState, ConfidenceGrid
+from groundmap import CellState, ConfidenceGrid, StereoRig
 from groundmap.arrays import Bools, Floats
 from groundmap.io.folder import FolderLog
+from groundmap.settings import MapperSettings
+from groundmap.simulate.measures import measure
+from groundmap.simulate.truth import truth_of
 
 GENERATOR = Path(__file__).parent.parent / "tools" / "make_demo.py"
 DATA = Path(str(files("planners") / "demo_data"))
@@ -73,7 +77,7 @@ def test_the_route_goes_through_the_doorway_and_hits_nothing(ran: Ran, courtyard
     feature = json.loads(Path(ran.json["route"]).read_text())
     line = shapely.LineString(feature["geometry"]["coordinates"])
     assert line.crosses(shapely.LineString(courtyard.DOOR))
-    truth = shapely.union_all([shapely.box(*box[:4]) for box in courtyard.BOXES])
+    truth = _obstacles(courtyard)
     assert shapely.distance(line, truth) > 0.2  # by the map it is 0.35 m, of noisy features
 
 
@@ -91,7 +95,7 @@ def test_no_free_space_leads_through_the_walls_but_by_the_doorway(
 def test_the_map_is_true_to_the_courtyard(grid: ConfidenceGrid, courtyard: Any) -> None:
     free, centres = _free_cells(grid)
     points = shapely.points(centres)
-    truth = shapely.union_all([shapely.box(*box[:4]) for box in courtyard.BOXES])
+    truth = _obstacles(courtyard)
     yard = shapely.box(0.0, 0.0, 24.0, 16.0)
     open_space = shapely.contains(yard, points) & (shapely.distance(truth, points) > WALL_NOISE)
     assert free[open_space].mean() > 0.8
@@ -100,20 +104,35 @@ def test_the_map_is_true_to_the_courtyard(grid: ConfidenceGrid, courtyard: Any) 
     assert free[shapely.distance(yard, points) > WALL_NOISE].mean() < 0.01
 
 
+def test_the_map_measures_up_to_what_could_be_seen(grid: ConfidenceGrid, courtyard: Any) -> None:
+    window = grid.window()
+    truth = truth_of(
+        courtyard.COURTYARD, courtyard.moves(), courtyard.SENSOR, window, MapperSettings()
+    )
+    measures = measure(window, truth)
+    assert (measures.free_recall or 0.0) > 0.85
+    assert (measures.nonfree_recall or 0.0) > 0.95
+    assert measures.false_free_beyond is not None
+    assert measures.false_free_beyond < 0.005
+    assert measures.boundary_p95 is not None
+    assert measures.boundary_p95 < 1.0  # [m], what stereo tells the range of a wall 12 m away to
+
+
 def test_the_log_is_what_the_generator_makes(courtyard: Any) -> None:
     with np.load(DATA / "features.npz", allow_pickle=False) as shipped:
-        for kind, rows in courtyard.features().items():
+        for kind, rows in courtyard.tables(courtyard.views()).items():
             assert shipped[kind].dtype == np.float32
             npt.assert_array_equal(shipped[kind][:, :2], rows[:, :2])
             npt.assert_allclose(shipped[kind][:, 2:], rows[:, 2:], rtol=0, atol=0.011)
     log = FolderLog(DATA)
     poses = [view.T_map_base for view in log]
-    npt.assert_allclose(poses, courtyard.drive(), rtol=0, atol=1e-6)
-    npt.assert_allclose(log.rig.T_base_camera, courtyard.rig().T_base_camera, atol=1e-12)
+    npt.assert_allclose(poses, courtyard.moves().logged, rtol=0, atol=1e-6)
+    assert [view.timestamp for view in log] == courtyard.moves().times.tolist()
+    _check_rig(log.rig, courtyard.SENSOR.rig)
 
 
 def test_the_log_is_small() -> None:
-    assert sum(path.stat().st_size for path in DATA.iterdir()) < 1_000_000
+    assert sum(path.stat().st_size for path in DATA.iterdir()) < 500_000
 
 
 def test_a_second_run_replaces_the_files(ran: Ran, folder: Path) -> None:
@@ -156,6 +175,19 @@ def test_a_folder_that_can_not_be_made_is_refused_before_the_work(tmp_path: Path
     ran = run("demo", "--out", tmp_path / "taken")
     assert ran.code == 2
     assert "expected a folder, or the name of a new one, got a file." in ran.err
+
+
+def _check_rig(rig: StereoRig, expected: StereoRig) -> None:
+    for name, value in dataclasses.asdict(expected).items():
+        npt.assert_allclose(getattr(rig, name), value, rtol=0, atol=1e-12, err_msg=name)
+
+
+def _obstacles(courtyard: Any) -> shapely.Geometry:
+    settings = MapperSettings()
+    truth: shapely.Geometry = courtyard.COURTYARD.obstacles(
+        settings.step_height, settings.robot_height
+    )
+    return truth
 
 
 def _free_cells(grid: ConfidenceGrid) -> tuple[Bools, Floats]:

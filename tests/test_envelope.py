@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from groundmap.arrays import Floats, Ints
-from groundmap.kernels.envelope import fill_gaps, upper_envelope
-from oracles import inverse_ranges
+from groundmap.arrays import Bools, Floats, Ints
+from groundmap.kernels.envelope import join_envelopes, upper_envelope
+from oracles import inverse_ranges, sight_ranges
 from strategies import rngs
 
 DENSE = np.linspace(-np.pi, np.pi, 4001)[1:-1] + 1e-5
@@ -92,26 +95,93 @@ def test_no_edges_have_an_empty_envelope() -> None:
     assert [len(part) for part in upper_envelope(none, none, none, none)] == [0, 0, 0]
 
 
-@settings(max_examples=100)
-@given(rngs())
-def test_a_second_envelope_speaks_only_in_the_gaps_of_the_first(rng: np.random.Generator) -> None:
-    first = upper_envelope(*by_bearing(random_edges(rng, int(rng.integers(0, 6)))))
-    second = upper_envelope(*by_bearing(random_edges(rng, int(rng.integers(0, 6)))))
-    low, high, edge, from_second = fill_gaps(*first, *second)
-    assert (low < high).all()
-    assert (high[:-1] <= low[1:]).all()
-    ours, theirs = at(DENSE, *first), at(DENSE, *second)
-    np.testing.assert_array_equal(at(DENSE, low, high, edge), np.where(ours >= 0, ours, theirs))
-    np.testing.assert_array_equal(
-        at(DENSE, low, high, from_second.astype(np.int64)) == 1, (ours < 0) & (theirs >= 0)
-    )
+class Joined(NamedTuple):
+    """Nearest edges and farthest supports, and what joining them gives."""
+
+    edges: Floats
+    alone: Bools
+    supports: Floats
+    low: Floats
+    high: Floats
+    edge: Ints
+    second: Bools
+
+
+def joined(edges: Floats, alone: Bools, supports: Floats) -> Joined:
+    t0, t1, a, b = by_bearing(edges)
+    far_t0, far_t1, far_a, far_b = by_bearing(supports)
+    nearest = upper_envelope(t0, t1, a, b)
+    farthest = upper_envelope(far_t0, far_t1, -far_a, -far_b)
+    found = join_envelopes(*nearest, alone, a, b, *farthest, far_a, far_b)
+    return Joined(edges, alone, supports, *found)
+
+
+def random_joined(rng: np.random.Generator, share_alone: float) -> Joined:
+    edges, supports = (random_edges(rng, int(rng.integers(0, 12))) for _ in range(2))
+    return joined(edges, rng.uniform(size=len(edges)) < share_alone, supports)
+
+
+ALONE = st.sampled_from([0.0, 0.5, 1.0])
+
+
+@settings(max_examples=200)
+@given(rngs(), ALONE)
+def test_edges_bound_alone_and_the_others_with_supports_the_nearer_of_both(
+    rng: np.random.Generator, share_alone: float
+) -> None:
+    parts = random_joined(rng, share_alone)
+    expected = sight_ranges(parts.edges, parts.alone, parts.supports, DENSE)
+    piece = at(DENSE, parts.low, parts.high, np.arange(len(parts.low)))
+    np.testing.assert_array_equal(piece >= 0, expected > 0)
+    (spoken,) = np.nonzero(piece >= 0)
+    edge, second = parts.edge[piece[spoken]], parts.second[piece[spoken]]
+    inverse = np.empty(len(spoken))
+    for ends, rows in ((parts.edges, ~second), (parts.supports, second)):
+        inverse[rows] = inverse_ranges(ends, DENSE[spoken[rows]])[edge[rows], np.arange(rows.sum())]
+    np.testing.assert_allclose(inverse * expected[spoken], 1.0, rtol=1e-9)
+
+
+@settings(max_examples=200)
+@given(rngs(), ALONE)
+def test_joined_pieces_are_in_order_and_lie_on_what_they_are_of(
+    rng: np.random.Generator, share_alone: float
+) -> None:
+    parts = random_joined(rng, share_alone)
+    assert (parts.low < parts.high).all()
+    assert (parts.high[:-1] <= parts.low[1:]).all()
+    for ends, rows in ((parts.edges, ~parts.second), (parts.supports, parts.second)):
+        t0, t1, _, _ = by_bearing(ends)
+        edge = parts.edge[rows]
+        assert ((t0[edge] <= parts.low[rows]) & (parts.high[rows] <= t1[edge])).all()
+
+
+def test_an_edge_that_crosses_its_support_bounds_up_to_the_crossing() -> None:
+    edge = np.array([[(1.0, -1.0), (3.0, 1.0)]])
+    support = np.array([[(3.0, -1.0), (1.0, 1.0)]])
+    parts = joined(edge, np.array([False]), support)
+    # The support begins behind the edge and ends before it; from -45 degrees on there is no edge.
+    slope = np.arctan2(1.0, 3.0)
+    np.testing.assert_allclose(parts.low, [-slope, 0.0, slope], atol=1e-12)
+    np.testing.assert_allclose(parts.high, [0.0, slope, np.pi / 4], atol=1e-12)
+    assert parts.second.tolist() == [False, True, True]
+    alone = joined(edge, np.array([True]), support)
+    np.testing.assert_allclose(alone.low, [-np.pi / 4, slope])
+    assert alone.second.tolist() == [False, True]
+
+
+def test_an_edge_that_does_not_stand_alone_says_nothing_without_support() -> None:
+    edge = np.array([[(4.0, -1.0), (4.0, 1.0)]])
+    assert len(joined(edge, np.array([False]), np.empty((0, 2, 2))).low) == 0
+    assert joined(edge, np.array([True]), np.empty((0, 2, 2))).second.tolist() == [False]
 
 
 @pytest.mark.parametrize("gap", [1e-3, 1e-9])
-def test_narrow_gaps_are_filled(gap: float) -> None:
-    first = (np.array([0.0, 1.0 + gap]), np.array([1.0, 2.0]), np.array([0, 1]))
-    second = (np.array([-1.0]), np.array([3.0]), np.array([7]))
-    low, high, edge, from_second = fill_gaps(*first, *second)
+@pytest.mark.parametrize("alone", [False, True])
+def test_narrow_gaps_are_filled(gap: float, alone: bool) -> None:
+    low, high = np.array([0.0, 1.0 + gap]), np.array([1.0, 2.0])
+    nearest = (low, high, np.array([0, 1]), np.full(2, alone), np.full(2, 2.0), np.full(2, 2.0))
+    behind = (np.array([-0.5]), np.array([2.2]), np.array([7]), np.full(8, 0.1), np.full(8, 0.2))
+    out_low, out_high, edge, second = join_envelopes(*nearest, *behind)
     assert edge.tolist() == [7, 0, 7, 1, 7]
-    assert from_second.tolist() == [True, False, True, False, True]
-    np.testing.assert_array_equal(high[:-1], low[1:])
+    assert second.tolist() == [True, False, True, False, True]
+    np.testing.assert_array_equal(out_high[:-1], out_low[1:])

@@ -27,6 +27,8 @@ from groundmap.arrays import Floats
 from groundmap.errors import GroundmapError, InputError, NoGroundPlaneError, SettingsError
 from groundmap.frames import T_REP103_OPTICAL, invert
 from groundmap.fusion import Average, Capped
+from groundmap.heights import flatten
+from groundmap.smoothing import smoothed
 
 HEIGHT = 1.5
 GROUND = GroundPlane(normal=np.array([0.0, 0.0, 1.0]), offset=0.0)
@@ -234,6 +236,24 @@ def test_explaining_a_view_changes_nothing() -> None:
     assert mapper.stats.features_used == before.stats["features_used"] + parts.flat.used
 
 
+def test_features_are_smoothed_before_they_are_linked() -> None:
+    rng = np.random.default_rng(7)
+    wall = np.column_stack([np.full(60, 6.0), np.linspace(-1.5, 1.5, 60), np.full(60, 0.7)])
+    view = view_of(
+        wall + rng.normal(0, 0.1, wall.shape) * (1, 0, 0), np.empty((0, 2, 3)), sigma=0.1
+    )
+    raw, flat = (
+        GroundMapper(smoothing=width).explain(view).flat.points[:, 0] for width in (0.0, 0.25)
+    )
+    assert np.std(raw) > 0.08
+    assert np.std(flat) < np.std(raw) / 2
+    chosen = GroundMapper()
+    npt.assert_array_equal(
+        chosen.explain(view).flat.points,
+        smoothed(flatten(view, chosen.settings), chosen.settings).points,
+    )
+
+
 def test_an_empty_view_adds_a_pose_and_nothing_else() -> None:
     rng = np.random.default_rng(6)
     mapper = mapped([room_view(rng)])
@@ -290,6 +310,8 @@ A = (2.0, 0.0, 0.5)
     "ellipsoid",
 )
 @example([(0.5, 0.0, 2.5)], [], 0.0, 3.0, "ellipsoid")  # overhead, and as uncertain as high
+# Many that may be one surface, each of them so unsure that it may be anywhere.
+@example([(x / 2, y / 8, 1.0) for x in (2, 6, 12) for y in range(-3, 4)], [], 0.0, 3.0, "ellipsoid")
 def test_no_view_is_too_degenerate_to_be_mapped_and_accounted_for(
     points: list[tuple[float, float, float]],
     segments: list[tuple[tuple[float, float, float], tuple[float, float, float]]],

@@ -18,7 +18,7 @@ from groundmap.surfaces import SurfaceKind, Surfaces, find_surfaces
 from groundmap.triangulation import triangulate
 from strategies import Cloud, flat_view, level_view, rngs, rooms
 
-OPTIONS = MapperSettings(uncertainty="ellipsoid")
+OPTIONS = MapperSettings()
 
 
 def surfaces_of(flat: FlatView, options: MapperSettings = OPTIONS) -> Surfaces:
@@ -53,15 +53,19 @@ def test_edges_are_links_by_length_range_and_height_and_frontiers_else(
     corners = Delaunay(points).simplices[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     links: set[frozenset[int]] = set()
     frontiers: set[frozenset[int]] = set()
+    doubtful: set[frozenset[int]] = set()
     joined: set[int] = set()
     for a, b in {(min(pair), max(pair)) for pair in corners.tolist()}:
         length = np.hypot(*(points[a] - points[b]))
-        near_enough = length <= longest_link(min(range_[a], range_[b]), options)
+        longest = longest_link(min(range_[a], range_[b]), options)
+        near_enough = length <= longest
         if near_enough and abs(height[a] - height[b]) <= link_height:
             links.add(frozenset([a, b]))
             joined.update((a, b))
         else:
             frontiers.add(frozenset([a, b]))
+            if length <= 3 * longest:
+                doubtful.add(frozenset([a, b]))
     surfaces = surfaces_of(flat_view(points, heights=height), options)
     ends = points.round(9)
     named = {tuple(place): row for row, place in enumerate(ends.tolist())}
@@ -71,6 +75,7 @@ def test_edges_are_links_by_length_range_and_height_and_frontiers_else(
 
     assert rows(of_kind(surfaces, SurfaceKind.LINK)) == links
     assert rows(surfaces.frontiers) == frontiers
+    assert rows(of_kind(surfaces, SurfaceKind.DOUBTFUL)) == doubtful
     lone = of_kind(surfaces, SurfaceKind.LONE).mean(axis=1).round(9)
     assert {named[tuple(place)] for place in lone.tolist()} == set(range(len(points))) - joined
 
@@ -91,11 +96,42 @@ def test_edges_are_links_by_length_range_and_height_and_frontiers_else(
 def test_a_link_is_believed_up_to_its_bound(
     distance: float, length: float, footprint: float, linked: bool
 ) -> None:
-    options = MapperSettings(narrowest_footprint=footprint)
+    options = MapperSettings(narrowest_footprint=footprint, doubt=1)
     surfaces = surfaces_of(flat_view([(distance, 0), (distance, length)]), options)
     kind = SurfaceKind.LINK if linked else SurfaceKind.LONE
     assert set(surfaces.kind.tolist()) == {kind}
     assert len(surfaces.frontiers) == (0 if linked else 1)
+
+
+@pytest.mark.parametrize(
+    ("distance", "length", "footprint", "doubt", "doubtful"),
+    [
+        (5.0, 0.51, 1.0, 3.0, True),
+        (5.0, 1.49, 1.0, 3.0, True),  # three times half a metre
+        (5.0, 1.51, 1.0, 3.0, False),
+        (17.5, 2.09, 1.0, 3.0, True),  # three times 0.04 rad
+        (17.5, 2.11, 1.0, 3.0, False),
+        (5.0, 1.19, 0.5, 3.0, True),  # three times 0.8 of the footprint
+        (5.0, 1.21, 0.5, 3.0, False),
+        (5.0, 0.74, 1.0, 1.5, True),
+        (5.0, 0.76, 1.0, 1.5, False),
+    ],
+)
+def test_an_unbelieved_link_is_doubtful_up_to_a_multiple_of_its_bound(
+    distance: float, length: float, footprint: float, doubt: float, doubtful: bool
+) -> None:
+    options = MapperSettings(narrowest_footprint=footprint, doubt=doubt)
+    flat = flat_view([(distance, 0), (distance, length)])
+    surfaces = surfaces_of(flat, options)
+    found = of_kind(surfaces, SurfaceKind.DOUBTFUL)
+    assert pairs(found) == (pairs(flat.points[None]) if doubtful else set())
+    assert len(of_kind(surfaces, SurfaceKind.LONE)) == 2  # to draw, its ends are alone
+    assert len(surfaces.frontiers) == 1
+
+
+def test_a_short_link_between_bands_that_do_not_overlap_is_doubtful() -> None:
+    surfaces = surfaces_of(flat_view([(5, 0), (5, 0.4)], heights=[0.2, 0.8]))
+    assert sorted(surfaces.kind.tolist()) == [SurfaceKind.LONE, SurfaceKind.LONE, 3]
 
 
 @pytest.mark.parametrize(("depth", "linked"), [(0.69, True), (0.71, False)])
@@ -151,6 +187,7 @@ def test_values_turn_with_the_ends() -> None:
     surfaces = surfaces_of(flat)
     np.testing.assert_array_equal(surfaces.ends[0], [(5, -2), (5, 2)])
     np.testing.assert_array_equal(surfaces.tops[0], [0.4, 1.8])
+    np.testing.assert_array_equal(surfaces.bottoms[0], [0.4, 1.8])
     np.testing.assert_allclose(surfaces.reach[0], [0.2, 0.6])
 
 
@@ -158,6 +195,14 @@ def test_an_edge_within_the_near_range_is_counted_and_dropped() -> None:
     surfaces = surfaces_of(flat_view([(0.1, -0.2), (0.1, 0.2), (0.2, 0.0), (5, 5)], [(0, 1)]))
     assert surfaces.through_viewpoint > 0
     assert pairs(of_kind(surfaces, SurfaceKind.SEGMENT)) == set()
+
+
+def test_a_doubtful_link_within_the_near_range_is_dropped_and_not_counted() -> None:
+    options = MapperSettings(link_length=0.1, link_angle=0.0, min_range=1.0)
+    # One link lies inside, two end there; the two lone points inside are what is counted.
+    surfaces = surfaces_of(flat_view([(0.8, 0.0), (0.8, 0.2), (1.1, 0.0)]), options)
+    assert (np.hypot(*np.moveaxis(surfaces.ends, -1, 0)) >= 1.0 - 1e-9).all()
+    assert surfaces.through_viewpoint == 2
 
 
 def test_an_edge_that_enters_the_near_range_is_cut_there() -> None:
@@ -188,6 +233,7 @@ def test_a_lone_point_is_a_disc_of_half_a_cell_or_its_sigma(
     assert np.hypot(*across) == pytest.approx(2 * radius)
     assert across @ (6, 3) == pytest.approx(0.0, abs=1e-12)
     np.testing.assert_array_equal(surfaces.tops, [[0.7, 0.7]])
+    np.testing.assert_array_equal(surfaces.bottoms, [[0.7, 0.7]])
 
 
 def test_only_lone_points_have_discs() -> None:
@@ -205,6 +251,7 @@ def test_where_segments_cross_the_band_spans_both() -> None:
     at_crossing = np.isclose(surfaces.ends, (5, 0)).all(axis=2)
     assert at_crossing.sum() == 4
     np.testing.assert_allclose(surfaces.tops[at_crossing], 1.2)
+    np.testing.assert_allclose(surfaces.bottoms[at_crossing], 0.5)
     np.testing.assert_allclose(surfaces.reach[at_crossing], 2 * np.sqrt(0.02))
 
 
@@ -229,6 +276,7 @@ def test_features_that_share_a_vertex_span_a_band_and_take_the_widest_covariance
     )
     surfaces = surfaces_of(flat)
     assert surfaces.tops[0].tolist() == [1.7, 0.3]
+    assert surfaces.bottoms[0].tolist() == [0.3, 0.3]
     np.testing.assert_allclose(surfaces.reach[0], [2 * np.sqrt(0.25), 0.0])
 
 
@@ -243,7 +291,8 @@ def test_every_surface_has_a_height_and_a_reach(room: Cloud, rng: np.random.Gene
         covariance=rng.uniform(0.0, 0.3, size=count) ** 2,
     )
     surfaces = surfaces_of(flat)
-    assert ((surfaces.tops >= 0.2 - 1e-9) & (surfaces.tops <= 1.9 + 1e-9)).all()
+    assert ((surfaces.bottoms >= 0.2 - 1e-9) & (surfaces.tops <= 1.9 + 1e-9)).all()
+    assert (surfaces.bottoms <= surfaces.tops).all()
     assert ((surfaces.reach >= 0) & (surfaces.reach <= 0.6 + 1e-9)).all()
 
 

@@ -110,8 +110,32 @@ def test_a_ray_through_the_spread_adds_up_to_one_cell_at_most(
     for model in (Ellipsoid(), Radius()):
         on_surface, around = model.evidence(both, resolution)
         assert around.item() == pytest.approx(expected)
-        assert on_surface.item() == (1.0 if model.name == "ellipsoid" else around.item())
+        on = min(1.0, 6.0 * expected) if model.name == "ellipsoid" else expected
+        assert on_surface.item() == pytest.approx(on)
         assert around.item() * max(2.0 * reach, resolution) == pytest.approx(resolution)
+
+
+@pytest.mark.parametrize(
+    ("sigma", "on_surface"), [(0.0, 1.0), (1.0, 1.0), (1.5, 1.0), (1.52, 0.987), (3.0, 0.5)]
+)
+def test_a_surface_is_sure_up_to_a_standard_deviation_of_one_and_a_half_cells(
+    sigma: float, on_surface: float
+) -> None:
+    resolution = 0.1
+    reach = np.full((1, 2), 2.0 * sigma * resolution)  # two standard deviations
+    found, around = Ellipsoid().evidence(reach, resolution)
+    assert found.item() == pytest.approx(on_surface, abs=1e-3)
+    assert found.item() >= around.item()
+
+
+@settings(max_examples=50)
+@given(rngs())
+def test_the_less_is_known_of_a_surface_the_less_it_says(rng: np.random.Generator) -> None:
+    reach = np.sort(rng.uniform(0.0, 3.0, size=20))
+    for model in (Ellipsoid(), Radius()):
+        for said in model.evidence(np.stack([reach, reach], axis=1), 0.1524):
+            assert (np.diff(said) <= 0.0).all()
+            assert ((said > 0.0) & (said <= 1.0)).all()
 
 
 @pytest.mark.parametrize("model", ["ellipsoid", "radius"])

@@ -31,14 +31,15 @@ def main() -> None:
         mapper.integrate(view)
     start = mapper.grid.trajectory[0, :2]
     route = plan(PlanningProblem(mapper.grid, start=start, goal=GOAL, footprint=FOOTPRINT))
-    figure = Figure(figsize=(15.0, 3.7), layout="constrained")
+    figure = Figure(figsize=(15.0, 3.5), layout="constrained")
     axes = figure.subplots(1, 4, width_ratios=(1.0, 1.0, 1.45, 1.45))
     draw_features(parts, ax=axes[0])
     figure.axes[-1].remove()  # the scale of the heights
     draw_fan(parts, ax=axes[1])
     draw_triangulation(parts, ax=axes[1])
     for ax in axes[2:]:
-        draw_grid(mapper.grid, bounds=MAP_BOUNDS, ax=ax)
+        for scale in draw_grid(mapper.grid, bounds=MAP_BOUNDS, ax=ax)[1:3]:
+            scale.remove()  # it would lie on a wall
         ax.get_legend().remove()
     draw_trajectory(mapper.grid.trajectory, ax=axes[2])
     axes[2].get_legend().remove()

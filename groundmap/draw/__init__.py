@@ -5,6 +5,7 @@ apart in greyscale, too: free is the lightest, unknown darker, contested darker 
 nearly black.
 """
 
+from groundmap.draw.curves import draw_curves
 from groundmap.draw.figure import check_picture, new_figure, save_figure
 from groundmap.draw.maps import draw_grid, draw_trajectory, draw_verdicts, known_bounds
 from groundmap.draw.routes import draw_route
@@ -14,6 +15,7 @@ from groundmap.draw.views import draw_view
 __all__ = [
     "check_picture",
     "draw_case",
+    "draw_curves",
     "draw_difference",
     "draw_grid",
     "draw_route",

@@ -24,7 +24,8 @@ def passed_through(
     heights: Floats,
     shares: Floats,
     camera_height: float,
-    margin: float,
+    behind: float,
+    below: float,
     against: Floats,
     passes: Bools,
 ) -> None:
@@ -38,8 +39,9 @@ def passed_through(
         At both ends.
     bearings, points, heights, shares : ndarray, shapes (n,), (n, 2), (n,), (n,)
         Of the features, sorted by bearing; `shares` is what each row counts.
-    camera_height, margin : float
-        A feature is behind if it is so by twice the reach and `margin`.
+    camera_height, behind, below : float
+        A feature is behind if it is so by twice the reach and `behind`; its line of sight passes
+        below the top if it does by `below`.
     against : ndarray, shape (s,)
         What is counted is added here.
     passes : ndarray of bool, shape (n,)
@@ -63,10 +65,10 @@ def passed_through(
             t = ((x * share - x0) * ex + (y * share - y0) * ey) / square
             t = min(max(t, 0.0), 1.0)
             away = (1.0 - share) * np.hypot(x, y)
-            if away <= 2.0 * ((1 - t) * reach[s, 0] + t * reach[s, 1]) + margin:
+            if away <= 2.0 * ((1 - t) * reach[s, 0] + t * reach[s, 1]) + behind:
                 continue
             sight = camera_height + (heights[row - 1] - camera_height) * share
-            if sight < (1 - t) * tops[s, 0] + t * tops[s, 1]:
+            if sight < (1 - t) * tops[s, 0] + t * tops[s, 1] - below:
                 against[s] += shares[row - 1]
                 passes[row - 1] = True
 

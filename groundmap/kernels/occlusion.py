@@ -12,7 +12,7 @@ from numba import njit
 
 from groundmap.arrays import Bools, Floats, Ints
 
-TINY = 1e-12  # of a line of sight: what is touched is not hidden
+TINY = 1e-12  # of a line of sight: a corner that is touched hides nothing
 
 
 @njit(cache=True, nogil=True)

@@ -16,7 +16,7 @@ class DriveSettings(Settings):
     """Where the robot goes, and how well the log knows it."""
 
     stops: tuple[tuple[float, float, float], ...] = Field(
-        min_length=1, description="x, y [m, map] and yaw [deg]; it turns where only yaw changes"
+        min_length=1, description="x, y [m, map] and yaw [deg]; it turns the shorter way"
     )
     every: float = Field(1.0, gt=0, description="it takes a view at least this often [m]")
     every_turn: float = Field(0.5, gt=0, description="and at least this often in turns [rad]")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import shapely
@@ -9,14 +10,13 @@ from pydantic import Field
 
 from groundmap.errors import InputError
 from groundmap.settings import Settings
-from groundmap.simulate.shapes import box, pole, table, wall
-from groundmap.simulate.world import ALWAYS, Hole, Solid
+from groundmap.simulate.shapes import box, pole, polygon, table, wall
+from groundmap.simulate.world import Hole, Solid
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
-OF_SOLIDS = (
-    "bottom", "texture", "lines", "edges", "transparent", "repeat", "present", "velocity",
-)  # fmt: skip
+OF_SOLIDS = ("texture", "lines", "edges", "transparent", "repeat", "velocity")
+TOP, TABLE_TOP = 2.5, 0.75  # [m], unless told
 
 
 class _Shaped(Settings):
@@ -41,14 +41,17 @@ class SolidSettings(_Shaped):
     pole: Point | None = Field(None, description="x, y of its middle [m]")
     radius: float = Field(0.06, gt=0, description="of a pole [m]")
     table: Box | None = Field(None, description="two opposite corners of its top [m]")
-    top: float = Field(2.5, description="height of its top [m]")
+    top: float | None = Field(
+        None, description="height of its top; 2.5, of a table 0.75, unless told [m]"
+    )
     bottom: float = Field(0.0, description="height of its underside [m]")
     texture: float = Field(6.0, ge=0, description="point features on it [1/m²]")
     lines: float = Field(0.4, ge=0, description="segments on it, in each direction [1/m²]")
     edges: bool = Field(True, description="whether its edges are matched")
     transparent: bool = Field(False, description="glass")
     repeat: float = Field(0.0, ge=0, description="spacing of a repeated pattern; 0 for none [m]")
-    present: tuple[float, float] = Field(ALWAYS, description="from when until when it is there [s]")
+    appears: float | None = Field(None, description="since when it is there [s]")
+    vanishes: float | None = Field(None, description="until when it is there [s]")
     velocity: tuple[float, float] = Field((0.0, 0.0), description="along x and y [m/s]")
 
     def solids(self) -> tuple[Solid, ...]:
@@ -61,12 +64,16 @@ class SolidSettings(_Shaped):
         (2.0, 0.03)
         """
         options: dict[str, Any] = {name: getattr(self, name) for name in OF_SOLIDS}
+        options["present"] = (
+            -math.inf if self.appears is None else self.appears,
+            math.inf if self.vanishes is None else self.vanishes,
+        )
         way = self._given("box", "polygon", "wall", "pole", "table")
         if way == "table":
             assert self.table is not None
-            del options["bottom"]
-            return table(*self.table, height=self.top, **options)
-        return (Solid(self._outline(way), top=self.top, **options),)
+            return table(*self.table, height=self.top or TABLE_TOP, **options)
+        top = TOP if self.top is None else self.top
+        return (Solid(self._outline(way), bottom=self.bottom, top=top, **options),)
 
     def _outline(self, way: str) -> shapely.Polygon:
         given = getattr(self, way)
@@ -74,7 +81,7 @@ class SolidSettings(_Shaped):
             return wall(given, thickness=self.thickness)
         if way == "pole":
             return pole(*given, radius=self.radius)
-        return box(*given) if way == "box" else shapely.Polygon(given)
+        return box(*given) if way == "box" else polygon(given)
 
 
 class HoleSettings(_Shaped):
@@ -85,4 +92,4 @@ class HoleSettings(_Shaped):
     def hole(self) -> Hole:
         """Return what the table describes."""
         given = getattr(self, way := self._given("box", "polygon"))
-        return Hole(box(*given) if way == "box" else shapely.Polygon(given), depth=self.depth)
+        return Hole(box(*given) if way == "box" else polygon(given), depth=self.depth)

@@ -24,7 +24,7 @@ class SensorSettings(MatchingSettings):
     baseline: float = Field(0.54, gt=0, description="distance between the cameras [m]")
     camera_height: float = Field(1.0, gt=0, description="above the ground [m]")
     camera_forward: float = Field(0.0, description="ahead of the middle of the robot [m]")
-    pitch: float = Field(0.1, description="of the camera, downwards [rad]")
+    pitch: float = Field(0.1, gt=-1.5, lt=1.5, description="of the camera, downwards [rad]")
     max_range: float = Field(25.0, gt=0, description="of what is matched [m]")
     max_points: int = Field(2000, ge=0, description="points matched in a view [features]")
     max_segments: int = Field(500, ge=0, description="segments matched in a view [features]")

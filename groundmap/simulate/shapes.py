@@ -29,6 +29,21 @@ def box(x0: float, y0: float, x1: float, y1: float) -> shapely.Polygon:
     return shapely.box(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
 
 
+def polygon(corners: npt.ArrayLike) -> shapely.Polygon:
+    """Return a polygon from its corners, shape (n, 2) [m].
+
+    Raises
+    ------
+    InputError
+        Fewer than three corners, or coordinates that are not finite.
+    """
+    ring = as_floats("polygon", corners, (None, 2))
+    check_finite("polygon", ring)
+    if len(ring) < 3:
+        raise InputError("polygon", "three corners or more [m]", str(len(ring)))
+    return shapely.Polygon(ring)
+
+
 def wall(points: npt.ArrayLike, *, thickness: float = 0.2) -> shapely.Polygon:
     """Return a wall along a polyline, shape (n, 2) [m], which is its centre line.
 

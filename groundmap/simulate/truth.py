@@ -37,8 +37,8 @@ class Truth:
     nonfree : ndarray of bool, shape (rows, cols)
         Cells that an obstacle reaches into.
     visible : ndarray of bool, shape (rows, cols)
-        Cells whose centre some view saw along the ground: in both images, in range, with nothing
-        but free ground between.
+        Cells of the world's ground whose centre some view saw along it: in both images, in range,
+        with nothing but free ground between.
     in_line : ndarray of bool, shape (rows, cols)
         The same for a camera that looks all around and without end. Free cells of a map outside
         of it lie behind a surface or in it: the dangerous mistake.
@@ -90,11 +90,16 @@ def truth_of(
     return Truth(
         obstacles=at_end,
         nonfree=touched_cells(at_end, window.origin, window.resolution, shape),
-        visible=sight.visible.reshape(shape),
+        visible=(sight.visible & _within(world.bounds, centres)).reshape(shape),
         in_line=sight.in_line.reshape(shape),
         surfaces=samples[sight.surfaces_seen],
         viewpoints=eyes[:, :2, 3],
     )
+
+
+def _within(bounds: tuple[float, float, float, float], places: Floats) -> Bools:
+    inside: Bools = ((places >= bounds[:2]) & (places <= bounds[2:])).all(axis=1)
+    return inside
 
 
 class _Sight:

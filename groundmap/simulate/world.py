@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 from shapely.affinity import translate
 
+from groundmap.arrays import as_floats
 from groundmap.errors import InputError
 
 ALWAYS = (-math.inf, math.inf)
@@ -74,6 +75,8 @@ class Solid:
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0):
                 raise InputError(name, "a number of 0 or more", str(value))
+        if not np.isfinite(self.velocity).all():
+            raise InputError("velocity", "finite numbers [m/s]", str(self.velocity))
         if not self.present[0] < self.present[1]:
             raise InputError("present", "(from, until) [s]", str(self.present))
 
@@ -158,7 +161,7 @@ class World:
 
     def __post_init__(self) -> None:
         """Check the bounds and the densities."""
-        xmin, ymin, xmax, ymax = self.bounds
+        xmin, ymin, xmax, ymax = as_floats("bounds", self.bounds, (4,))
         if not (np.isfinite(self.bounds).all() and xmin < xmax and ymin < ymax):
             raise InputError("bounds", "XMIN < XMAX and YMIN < YMAX [m]", str(self.bounds))
         for name in ("ground_texture", "ground_lines"):
@@ -200,7 +203,6 @@ def _polygon(name: str, outline: shapely.Polygon) -> shapely.Polygon:
     if not isinstance(outline, shapely.Polygon):
         raise InputError(name, "a shapely.Polygon", repr(outline))
     if not outline.is_valid or outline.area <= 0:
-        raise InputError(
-            name, "a polygon with an area", shapely.is_valid_reason(outline), hint="[m, map]"
-        )
+        fault = "one without" if outline.is_valid else shapely.is_valid_reason(outline)
+        raise InputError(name, "a polygon with an area [m, map]", fault)
     return shapely.orient_polygons(outline)

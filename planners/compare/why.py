@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 import shapely
@@ -25,12 +25,16 @@ POINTS = (50, 100, 150, 200, 300, 600, 900, 1800)  # features in a view
 SEGMENTS = (50, 100, 150, 200, 300)
 WALL = 0.2  # [m], thickness
 WALL_TOP = 2.0  # [m]
-ROOM_FROM_OBSTACLES = 0.5  # [m], around the camera and the way ahead of it
+HIGHEST_BOX = 1.8  # [m]
+ROOM_FROM_OBSTACLES = 1.0  # [m], around the camera and the way ahead of it
 CLEAR_AHEAD = 3.0  # [m], so that there is something to see
+RESOLUTION = 0.05  # [m], as maps for indoor navigation have
 MARGIN = 1.0  # [m] around a room that is judged, too: nothing there is free
 TEXTURE, LINES = 1000.0, 60.0  # [1/m²], points and segments: enough to choose from everywhere
 BUCKETS_PX = 12.0, 32.0  # sides of the squares of the image that hold one point, one segment
 ALL = 10**6  # features
+
+Spread = Literal["surfaces", "image"]
 
 
 class Curve(NamedTuple):
@@ -61,38 +65,73 @@ def compare_recall(
     *,
     rooms: int = 20,
     seed: int = 1,
+    spread: Spread = "surfaces",
+    lowest_box: float = 0.5,
     pixel_noise_px: float = 0.0,
     watch: Callable[[list[int]], Iterable[int]] = iter,
     **settings: Any,
 ) -> Curves:
     """Map single views of random rooms, by triangulation and by ray casting.
 
-    Within a room all maps are made of the same view. Its features are spread evenly over the
-    image, as detectors spread theirs; fewer features are a part of more. The ray caster is given
-    the points that the fan is given. Both know the ground plane.
+    Within a room all maps are made of the same view; fewer features are a part of more. The ray
+    caster is given the points that the fan is given. Both know the ground plane. No box is within
+    1 m of the camera or of the way 3 m ahead of it: a robot keeps that room when it looks around,
+    and what is nearer and beside it one image misses.
 
     Parameters
     ----------
     rooms : int
     seed : int
+    spread : "surfaces" or "image"
+        Where features are, of all that are in sight. ``surfaces``: everywhere on walls, boxes and
+        ground alike, as texture is. ``image``: one in each square of the image, as detectors
+        thin theirs out; most are then on the ground nearby and on high parts of the walls.
+    lowest_box : float [m]
+        Boxes are this high to 1.8 m; the camera is at 1 m.
     pixel_noise_px : float [px]
         Noise of the matcher, which is perfect else.
     watch : callable
         Wraps the list of rooms, to show progress.
     **settings
-        `groundmap.settings.MapperSettings`.
+        `groundmap.settings.MapperSettings`; ``resolution`` is 0.05 m unless told otherwise.
 
     Raises
     ------
     InputError
-        No room.
+        No room, another `spread`, or a `lowest_box` that is not above 0 and up to 1.8 m.
 
     Notes
     -----
-    A ray is as wide as a cell, so what rays find depends on ``resolution``; triangles do not.
+    20 rooms, seed 1, no noise. "Rays" is how many times as many rays find as much freespace;
+    "false" is the share of free cells that are wrong by more than 0.3 m.
+
+    ===============  =====  =====  =====  ==========
+    fan of           found  rays   false  of rays
+    ===============  =====  =====  =====  ==========
+    50 points         .702   3.4    .011  .031
+    100 points        .851   3.4    .009  .028
+    300 points        .947   2.1    .000  .033
+    50 segments       .806   5.3    .005
+    100 segments      .909   5.0    .007
+    300 segments      .975   3.4    .000
+    ===============  =====  =====  =====  ==========
+
+    What bounds these figures:
+
+    - False freespace of the fan lies behind boxes lower than the camera: lines of sight pass over
+      them, and no feature is on the part that would hide the ground behind.
+    - A ray is as wide as a cell, a triangle is not: rays gain with larger cells. At 0.05, 0.1 and
+      0.1524 m, 100 rays find .53, .73 and .82 (boxes as near as 0.5 m).
+    - Of features even over the image too few are on far surfaces to be linked.
+    - With noise, freespace ends two standard deviations before a surface, which rays ignore. From
+      900 points on rays find more than the fan, noise or not.
     """
     if rooms < 1:
         raise InputError("rooms", "1 or more", str(rooms))
+    if spread not in get_args(Spread):
+        raise InputError("spread", " or ".join(get_args(Spread)), repr(spread))
+    if not 0.0 < lowest_box <= HIGHEST_BOX:
+        raise InputError("lowest_box", f"above 0, up to {HIGHEST_BOX} [m]", str(lowest_box))
     sensor = SensorSettings(
         pixel_noise_px=pixel_noise_px,
         missing=0.0,
@@ -100,8 +139,10 @@ def compare_recall(
         max_points=ALL,
         max_segments=ALL,
     )
+    settings = {"resolution": RESOLUTION, **settings}
+    checked = MapperSettings(**settings)
     figures = [
-        _figures(_scene(seed, number, sensor, MapperSettings(**settings)), settings)
+        _figures(_scene((seed, number), spread, lowest_box, sensor, checked), settings)
         for number in watch(list(range(rooms)))
     ]
     points, segments, rays = (np.mean(system, axis=0).T for system in zip(*figures, strict=True))
@@ -112,8 +153,8 @@ def compare_recall(
     )
 
 
-def random_room(rng: np.random.Generator) -> World:
-    """Return a room of 8 to 14 m with 4 to 8 boxes in it, 0.5 to 1.8 m high."""
+def random_room(rng: np.random.Generator, *, lowest_box: float = 0.5) -> World:
+    """Return a room of 8 to 14 m with 4 to 8 boxes in it, up to 1.8 m high."""
     size = rng.uniform(8.0, 14.0, 2)
     inside = shapely.box(0.0, 0.0, *size)
     walls = inside.buffer(WALL, join_style="mitre").difference(inside)
@@ -121,7 +162,7 @@ def random_room(rng: np.random.Generator) -> World:
     for _ in range(rng.integers(4, 9)):
         middle, half = rng.uniform((0.0, 0.0), size), rng.uniform(0.2, 0.6, 2)
         box = rotate(shapely.box(*(middle - half), *(middle + half)), rng.uniform(0.0, 90.0))
-        top = rng.uniform(0.5, 1.8)
+        top = rng.uniform(lowest_box, HIGHEST_BOX)
         solids.append(Solid(box.intersection(inside), top=top, texture=TEXTURE, lines=LINES))
     return World(
         bounds=inside.bounds,
@@ -131,16 +172,22 @@ def random_room(rng: np.random.Generator) -> World:
     )
 
 
-def _scene(seed: int, number: int, sensor: SensorSettings, settings: MapperSettings) -> _Scene:
-    rng = np.random.default_rng((seed, number))
-    world = random_room(rng)
+def _scene(
+    seed: tuple[int, int],
+    spread: Spread,
+    lowest_box: float,
+    sensor: SensorSettings,
+    settings: MapperSettings,
+) -> _Scene:
+    rng = np.random.default_rng(seed)
+    world = random_room(rng, lowest_box=lowest_box)
     pose = to_transforms([_pose(world, rng)])
     stop = Drive(pose, pose, np.zeros(1))
     (view,) = observe(world, strew(world, rng), stop, sensor, seed=int(rng.integers(2**31)))
     view = replace(
         view,
-        points=_evenly(view.points, sensor.fx / BUCKETS_PX[0], rng),
-        segments=_evenly(view.segments, sensor.fx / BUCKETS_PX[1], rng),
+        points=_chosen(view.points, spread, sensor.fx / BUCKETS_PX[0], rng),
+        segments=_chosen(view.segments, spread, sensor.fx / BUCKETS_PX[1], rng),
         plane=GroundPlane.below_camera(sensor.rig, sensor.camera_height),
     )
     window = _judged(GroundMapper(**settings.model_dump()), world)
@@ -158,12 +205,16 @@ def _pose(world: World, rng: np.random.Generator) -> Floats:
             return np.array([*place, yaw])
 
 
-def _evenly(features: Features, buckets: float, rng: np.random.Generator) -> Features:
-    """Return one feature of each square of the image, in random order.
+def _chosen(
+    features: Features, spread: Spread, buckets: float, rng: np.random.Generator
+) -> Features:
+    """Return features in random order; those of ``image`` are one of each square of it.
 
     `buckets` is the number of squares to a focal length.
     """
     shuffled = features.select(rng.permutation(len(features)))
+    if spread == "surfaces":  # landmarks are strewn evenly over them
+        return shuffled
     middle = shuffled.xyz.reshape(len(shuffled), -1, 3).mean(axis=1)
     bucket = np.floor(buckets * middle[:, :2] / middle[:, 2:])
     _, first = np.unique(bucket, axis=0, return_index=True)

@@ -35,9 +35,7 @@ def ask(query: QuerySettings, grid: ConfidenceGrid) -> Answer:
     """Plan on a map."""
     try:
         route = plan(
-            PlanningProblem(
-                grid, start=query.start, goal=query.goal, footprint=query.footprint
-            ),
+            PlanningProblem(grid, start=query.start, goal=query.goal, footprint=query.footprint),
             planner=query.planner,
         )
     except PlanningError as error:
@@ -72,10 +70,10 @@ def held_to_truth(answer: Answer, simulated: Simulated, fine: ConfidenceGrid) ->
     return answer._replace(figures=figures)
 
 
-def bounds_of(query: QuerySettings) -> dict[str, Bound]:
+def bounds_of(query: QuerySettings, *, known_world: bool) -> dict[str, Bound]:
     """Return what the figures of a query are held to."""
     bounds = {"outcome": Bound(equals=query.expect)}
-    if query.expect == OUTCOME:
+    if query.expect == OUTCOME and known_world:
         bounds["collisions"] = Bound(max=0)
     if query.max_ratio is not None:
         bounds["ratio"] = Bound(max=query.max_ratio)
@@ -88,8 +86,7 @@ def true_map(simulated: Simulated) -> ConfidenceGrid:
     grid = ConfidenceGrid(resolution=FINE)
     rows, cols = np.ceil(np.array(window.count.shape) * window.resolution / FINE).astype(int)
     lower = np.floor(window.origin / FINE).astype(np.int64)[::-1]
-    nonfree = touched_cells(
-        simulated.truth.obstacles, lower[::-1] * FINE, FINE, (int(rows), int(cols))
-    )
+    origin = lower[::-1].astype(np.float64) * FINE
+    nonfree = touched_cells(simulated.truth.obstacles, origin, FINE, (int(rows), int(cols)))
     grid.fuse(lower, np.where(nonfree, 1.0, -1.0).astype(np.float32))
     return grid

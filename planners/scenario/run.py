@@ -5,8 +5,11 @@ from __future__ import annotations
 import time
 from dataclasses import asdict
 from pathlib import Path
+from typing import NamedTuple
 
-from groundmap import GroundMapper, draw, fit_ground, read_views
+import numpy as np
+
+from groundmap import GridWindow, GroundmapError, GroundMapper, draw, fit_ground, read_views
 from groundmap.evaluate import evaluate
 from groundmap.simulate.measures import measure
 from planners.scenario.case import Scenario, load_scenario
@@ -14,32 +17,37 @@ from planners.scenario.outcome import Bound, Figure, Outcome
 from planners.scenario.routes import Answer, ask, bounds_of, held_to_truth, true_map
 from planners.scenario.simulated import Simulated, simulate
 
-DPI = 75  # of the pictures in the report
+DPI = 100  # of the pictures in the report
+MARGIN = 1.5  # [m] around the world, in pictures
 
 
 def run_scenario(path: Path) -> Outcome:
     """Run the scenario of a file.
 
+    A world that can't be mapped fails the scenario, with the error's sentence.
+
     Raises
     ------
     FileFormatError
         The file is no scenario.
-    InputError
-        A bound on a figure that the scenario does not have.
     """
-    began = time.perf_counter()
     scenario = load_scenario(path)
     if scenario.log is not None and not scenario.log.exists():
         return Outcome(
             scenario.name, scenario.why, passed=None, skipped=f"there is no log {scenario.log}"
         )
-    figures, answers, picture = _recorded(scenario) if scenario.log else _simulated(scenario)
-    bounds = dict(scenario.bounds)
-    for answer in answers:
+    began = time.perf_counter()
+    try:
+        result = _recorded(scenario) if scenario.log else _simulated(scenario)
+    except GroundmapError as error:
+        result = Result({}, [], b"", f"{type(error).__name__}: {error}")
+    figures, bounds = dict(result.figures), dict(scenario.bounds)
+    for answer in result.answers:
         name = answer.query.name
         figures |= {f"{name}.{key}": value for key, value in answer.figures.items()}
-        bounds |= {f"{name}.{key}": bound for key, bound in bounds_of(answer.query).items()}
-    missed = _missed(figures, bounds, answers)
+        held = bounds_of(answer.query, known_world=scenario.log is None)
+        bounds |= {f"{name}.{key}": bound for key, bound in held.items()}
+    missed = (result.error,) if result.error else _missed(figures, bounds, result.answers)
     return Outcome(
         name=scenario.name,
         why=scenario.why,
@@ -47,12 +55,18 @@ def run_scenario(path: Path) -> Outcome:
         figures=figures,
         bounds=bounds,
         missed=missed,
-        picture=picture,
+        picture=result.picture,
         seconds=time.perf_counter() - began,
     )
 
 
-Result = tuple[dict[str, Figure], list[Answer], bytes]
+class Result(NamedTuple):
+    """What a scenario gave, before it is held to its bounds."""
+
+    figures: dict[str, Figure]
+    answers: list[Answer]
+    picture: bytes  # PNG
+    error: str = ""  # why there is none of it
 
 
 def _simulated(scenario: Scenario) -> Result:
@@ -63,7 +77,7 @@ def _simulated(scenario: Scenario) -> Result:
     if answers:
         fine = true_map(simulated)
         answers = [held_to_truth(answer, simulated, fine) for answer in answers]
-    return figures, answers, _picture(simulated, answers, scenario.name)
+    return Result(figures, answers, _picture(simulated, answers, scenario.name))
 
 
 def _recorded(scenario: Scenario) -> Result:
@@ -86,18 +100,29 @@ def _recorded(scenario: Scenario) -> Result:
     for answer in answers:
         if answer.waypoints is not None:
             draw.draw_route(answer.waypoints, footprint=answer.query.footprint, ax=axes)
-    return figures, answers, draw.figure_png(figure, dpi=DPI)
+    return Result(figures, answers, draw.figure_png(figure, dpi=DPI))
 
 
 def _picture(simulated: Simulated, answers: list[Answer], title: str) -> bytes:
-    truth = simulated.truth
+    """Draw truth, map and difference, of the world and a margin around it."""
+    truth, window = simulated.truth, simulated.window
+    corners = window.world_to_cell(np.reshape(simulated.world.bounds, (2, 2)))
+    margin = int(np.ceil(MARGIN / window.resolution))
+    low = np.maximum(corners[0] - margin, 0)
+    part = tuple(slice(a, b + 1) for a, b in zip(low, corners[1] + margin, strict=True))
     figure = draw.draw_case(
         simulated.grid,
         outline=truth.obstacles,
-        nonfree=truth.nonfree,
-        visible=truth.visible,
-        behind=~truth.in_line,
-        window=simulated.window,
+        nonfree=truth.nonfree[part],
+        visible=truth.visible[part],
+        behind=~truth.in_line[part],
+        window=GridWindow(
+            window.confidence[part],
+            window.count[part],
+            window.drop_offs[part],
+            window.origin + low[::-1] * window.resolution,
+            window.resolution,
+        ),
         routes=[
             (answer.query.name, answer.waypoints, answer.query.footprint)
             for answer in answers
@@ -117,21 +142,16 @@ def _picture(simulated: Simulated, answers: list[Answer], title: str) -> bytes:
 def _missed(
     figures: dict[str, Figure], bounds: dict[str, Bound], answers: list[Answer]
 ) -> tuple[str, ...]:
-    """Return a sentence for each bound that does not hold.
-
-    Raises
-    ------
-    InputError
-        A bound on a figure that there is none of.
-    """
+    """Return a sentence for each bound that does not hold."""
     reasons = {f"{answer.query.name}.outcome": answer.reason for answer in answers}
     sentences = []
     for name, bound in bounds.items():
-        value = figures.get(name)
-        if name not in figures and not isinstance(bound.equals, str) and not answers:
-            raise InputError(f"bounds.{name}", f"one of {', '.join(figures)}", "another figure")
-        if not bound.holds(value):
-            shown = f"{value:.4g}" if isinstance(value, float) else str(value)
-            reason = reasons.get(name, "")
-            sentences.append(f"{name} is {shown}, not {bound}" + (f" ({reason})" if reason else ""))
+        if bound.holds(figures.get(name)):
+            continue
+        if name not in figures and name.count(".") == 0:
+            sentences.append(f"there is no figure {name}; there are {', '.join(figures)}")
+            continue
+        value, reason = figures.get(name), reasons.get(name, "")
+        shown = f"{value:.4g}" if isinstance(value, float) else str(value)
+        sentences.append(f"{name} is {shown}, not {bound}" + (f" ({reason})" if reason else ""))
     return tuple(sentences)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from groundmap import ConfidenceGrid, GroundMapper, GridWindow, View, fit_ground
+from groundmap import ConfidenceGrid, GridWindow, GroundMapper, View, fit_ground
 from groundmap.draw import known_bounds
 from groundmap.simulate import Drive, World, drive, observe, strew
 from groundmap.simulate.scan import scan

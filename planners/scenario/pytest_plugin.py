@@ -1,0 +1,60 @@
+"""Scenarios as tests: ``pytest -p planners.scenario.pytest_plugin FOLDER`` runs one test for each.
+
+Each ``scenario.toml`` is a test, called after its folder.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from planners.scenario.case import FILE
+from planners.scenario.outcome import Outcome
+from planners.scenario.run import run_scenario
+
+
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> ScenarioFile | None:
+    """Take scenario files for test files."""
+    if file_path.name != FILE:
+        return None
+    return ScenarioFile.from_parent(parent, path=file_path)
+
+
+class ScenarioFile(pytest.File):
+    """A file with one scenario."""
+
+    def collect(self) -> Iterator[ScenarioItem]:
+        """Yield its one test."""
+        yield ScenarioItem.from_parent(self, name=self.path.parent.name)
+
+
+class ScenarioItem(pytest.Item):
+    """A scenario that passes if all its bounds hold."""
+
+    def runtest(self) -> None:
+        """Run it."""
+        outcome = run_scenario(self.path)
+        if outcome.passed is None:
+            pytest.skip(outcome.skipped)
+        if outcome.missed:
+            raise BoundsMissedError(outcome)
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], *args: Any) -> Any:
+        """Say which bounds were missed; anything else is shown as usual."""
+        if isinstance(excinfo.value, BoundsMissedError):
+            return str(excinfo.value)
+        return super().repr_failure(excinfo, *args)
+
+    def reportinfo(self) -> tuple[Path, None, str]:
+        """Return where it is and what it is called."""
+        return self.path, None, self.name
+
+
+class BoundsMissedError(AssertionError):
+    """A scenario whose bounds do not all hold."""
+
+    def __init__(self, outcome: Outcome) -> None:
+        super().__init__("\n".join([f"{outcome.name}: {outcome.why}", *outcome.missed]))

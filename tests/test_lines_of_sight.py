@@ -1,0 +1,407 @@
+"""Lines of sight: surfaces that are seen through, and the gaps that are seen as a whole."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from groundmap.arrays import Bools, Floats
+from groundmap.heights import FlatView
+from groundmap.kernels.lines import gap_chords, passed_through
+from groundmap.lines_of_sight import Contradictions, contradictions, support_chords
+from groundmap.settings import MapperSettings
+from groundmap.sight2d import visible_freespace
+from groundmap.surfaces import SurfaceKind, Surfaces, find_surfaces
+from groundmap.triangulation import triangulate
+from oracles import counted_against, farthest
+from oracles import gap_chords as all_chords
+from strategies import Cloud, flat_view, rngs, rooms
+
+SHARP = MapperSettings(uncertainty="none")
+MADE_OF = np.array([2.0, 2.0, 1.0, 1.0])  # features: segment, link, lone point, doubtful link
+
+
+def surfaces_of(flat: FlatView, options: MapperSettings = SHARP) -> Surfaces:
+    return find_surfaces(flat, triangulate(flat.points, flat.segments), options)
+
+
+def doubts(flat: FlatView, options: MapperSettings = SHARP) -> Contradictions:
+    return contradictions(flat, surfaces_of(flat, options))
+
+
+def sight(flat: FlatView, options: MapperSettings = SHARP, bearing: float = 0.0) -> float:
+    """Range up to which freespace is seen at a bearing."""
+    fan = visible_freespace(flat, surfaces_of(flat, options), options)
+    return float(farthest(fan.ends, np.array([bearing]))[0])
+
+
+# Counting
+
+
+def crowd(room: Cloud, rng: np.random.Generator) -> FlatView:
+    """A room of low and high obstacles with ground around, as uncertain as a stereo rig's."""
+    ground = rng.uniform(-12.0, 12.0, size=(rng.integers(0, 30), 2))
+    ground = ground[np.hypot(*ground.T) > 0.3]
+    flat = flat_view(
+        room.points,
+        room.segments,
+        heights=rng.uniform(0.0, 1.9, size=len(room.points)),
+        covariance=(0.005 * (room.points**2).sum(axis=1) * rng.uniform()) ** 2,
+        supports=ground,
+        support_heights=rng.uniform(-0.1, 0.1, size=len(ground)),
+        camera_height=float(rng.uniform(0.5, 2.0)),
+    )
+    # Some rows of ground are samples of one segment.
+    feature = flat.feature.copy()
+    sampled = feature[len(room.points) :]
+    sampled[:] = sampled // rng.integers(1, 5) + len(room.points)
+    return flat._replace(feature=feature)
+
+
+@settings(max_examples=150)
+@given(rooms(), rngs())
+def test_each_surface_is_contradicted_by_the_features_seen_through_it(
+    room: Cloud, rng: np.random.Generator
+) -> None:
+    flat = crowd(room, rng)
+    surfaces = surfaces_of(flat, MapperSettings())
+    found = contradictions(flat, surfaces)
+    # A feature right behind the end of a surface may be counted or not.
+    (fewest, sure), (most, perhaps) = (
+        counted_against(flat, surfaces, slack) for slack in (-1e-9, 1e-9)
+    )
+    assert (fewest - 1e-9 <= found.against).all()
+    assert (found.against <= most + 1e-9).all()
+    firm = np.flatnonzero(surfaces.kind != SurfaceKind.DOUBTFUL)
+    assert len(set().union(*(sure[row] for row in firm))) <= found.features
+    assert found.features <= len(set().union(*(perhaps[row] for row in firm)))
+
+
+@settings(max_examples=60)
+@given(rooms(), rngs())
+def test_belief_is_whole_unless_outnumbered_and_else_the_share_of_those_who_make_it(
+    room: Cloud, rng: np.random.Generator
+) -> None:
+    flat = crowd(room, rng)
+    surfaces = surfaces_of(flat, MapperSettings())
+    found = contradictions(flat, surfaces)
+    made = MADE_OF[surfaces.kind]
+    outnumbered = found.against > made
+    np.testing.assert_array_equal(found.hiding, ~outnumbered)
+    assert (found.belief[~outnumbered] == 1.0).all()
+    share = made / (made + found.against)
+    np.testing.assert_allclose(found.belief[outnumbered], share[outnumbered])
+    assert (found.belief[outnumbered] < 0.5).all()
+
+
+@settings(max_examples=60)
+@given(rooms(), rngs())
+def test_the_order_of_the_features_does_not_change_what_contradicts(
+    room: Cloud, rng: np.random.Generator
+) -> None:
+    flat = crowd(room, rng)
+    surfaces = surfaces_of(flat)
+    order = rng.permutation(len(flat.supports))
+    feature = flat.feature.copy()
+    feature[len(flat.points) :] = feature[len(flat.points) :][order]
+    shuffled = flat._replace(
+        supports=flat.supports[order], support_heights=flat.support_heights[order], feature=feature
+    )
+    one, other = contradictions(flat, surfaces), contradictions(shuffled, surfaces)
+    np.testing.assert_allclose(one.against, other.against)
+    assert one.features == other.features
+
+
+class Passed(NamedTuple):
+    against: Floats
+    passes: Bools
+
+
+def passed(
+    ends: npt.ArrayLike,
+    points: list[tuple[float, float]],
+    heights: list[float],
+    *,
+    reach: float = 0.0,
+    top: float = 1.5,
+) -> Passed:
+    """What the kernel counts for one surface, seen from 1 m up."""
+    places = np.array(points)
+    bearings = np.arctan2(places[:, 1], places[:, 0])
+    order = np.argsort(bearings)
+    against, passes = np.zeros(1), np.zeros(len(points), dtype=np.bool_)
+    passed_through(
+        np.array([ends], dtype=np.float64),
+        np.full((1, 2), reach),
+        np.full((1, 2), top),
+        bearings[order],
+        places[order],
+        np.array(heights)[order],
+        np.ones(len(points)),
+        1.0,
+        0.05,
+        against,
+        passes,
+    )
+    return Passed(against, passes)
+
+
+@pytest.mark.parametrize(
+    "ends",
+    [
+        [(4.0, 0.0), (4.0, 0.0)],  # no length
+        [(4.0, 1.0), (8.0, 2.0)],  # end-on
+        [(4.1, 1.3), (8.2, 2.6)],  # end-on, as far as rounding lets it
+        [(-4.0, 1.0), (-4.0, -1.0)],  # across the seam
+    ],
+)
+def test_nothing_is_seen_through_a_surface_that_covers_no_bearing_ahead(
+    ends: list[tuple[float, float]],
+) -> None:
+    behind = [(2 * x, 2 * y) for x, y in ends] + [(12.0, 3.0), (8.2, 2.6), (12.3, 3.9)]
+    assert passed(ends, behind, [0.0] * len(behind)).against.tolist() == [0.0]
+
+
+@pytest.mark.parametrize(("behind", "count"), [(0.04, 0), (0.06, 1)])
+@pytest.mark.parametrize("reach", [0.0, 0.3])
+def test_a_feature_within_twice_the_reach_is_on_the_surface(
+    behind: float, count: int, reach: float
+) -> None:
+    found = passed([(4, -1), (4, 1)], [(4.0 + 2 * reach + behind, 0.0)], [0.5], reach=reach)
+    assert found.against.tolist() == [count]
+    assert found.passes.tolist() == [bool(count)]
+
+
+# A hedge or a ghost 4 m ahead, a wall 8 m ahead; the camera is 1 m up.
+AHEAD = [(4.0, -1.0), (4.0, 1.0), (8.0, -3.0), (8.0, 3.0)]
+TWO_WALLS = [(0, 1), (2, 3)]
+
+
+def count_seen_through(
+    heights: list[float], extra: list[tuple[float, float]], extra_heights: list[float]
+) -> int:
+    """Count for two walls with those tops and points beside them."""
+    return doubts(flat_view(AHEAD + extra, TWO_WALLS, heights=heights + extra_heights)).features
+
+
+def test_a_wall_seen_over_a_hedge_is_not_seen_through_it() -> None:
+    # From 1.0 m up, over a hedge of 0.5 m, the ray at 8 m is at or above 0 m.
+    assert count_seen_through([0.5, 0.5, 1.8, 1.8], [(8.0, 0.0)], [0.2]) == 0
+
+
+def test_a_wall_seen_through_a_ghost_is_counted_once_per_feature() -> None:
+    # The ray to a point 1.4 m up is at 1.2 m where the ghost is 1.8 m high.
+    assert count_seen_through([1.8, 1.8, 1.8, 1.8], [(8.0, 0.0)], [1.4]) == 1
+    through = [(8.0, -0.5), (8.0, 0.0), (8.0, 0.5)]
+    assert count_seen_through([1.8, 1.8, 1.8, 1.8], through, [1.4, 1.4, 1.4]) == 3
+
+
+def test_a_feature_seen_through_two_surfaces_is_one_that_contradicts_both() -> None:
+    ghosts = [(4.0, -1.0), (4.0, 1.0), (5.0, -1.0), (5.0, 1.0)]
+    flat = flat_view(ghosts, TWO_WALLS, heights=1.0, supports=[(9.0, 0.0)])
+    found = doubts(flat)
+    assert found.features == 1
+    walls = surfaces_of(flat).kind == SurfaceKind.SEGMENT
+    assert found.against[walls].tolist() == [1.0, 1.0]
+
+
+def test_a_segment_seen_through_a_ghost_is_one_feature() -> None:
+    flat = flat_view(
+        [*AHEAD, (7.0, -0.5), (7.0, 0.5)], [*TWO_WALLS, (4, 5)], heights=[1.8] * 4 + [1.2] * 2
+    )
+    found = doubts(flat)
+    assert found.features == 1
+    assert found.against.tolist() == [1.0, 0.0, 0.0]
+
+
+def test_half_a_segment_seen_through_a_ghost_is_half_a_contradiction() -> None:
+    flat = flat_view(
+        [*AHEAD[:2], (7.0, 0.5), (7.0, 5.5)], [(0, 1), (2, 3)], heights=[1.8] * 2 + [1.2] * 2
+    )
+    assert doubts(flat).against.tolist() == [0.5, 0.0]
+
+
+@pytest.mark.parametrize(("height", "count"), [(0.99, 1), (1.01, 0)])
+def test_the_line_of_sight_is_compared_with_the_top_where_it_passes(
+    height: float, count: int
+) -> None:
+    # A top that falls from 1.5 m to 0.5 m is 1.0 m high in the middle, where a ray to a point
+    # of `height` at twice the range passes at the mean of 1.0 m and `height`.
+    assert count_seen_through([1.5, 0.5, 1.8, 1.8], [(8.0, 0.0)], [height]) == count
+
+
+def test_features_beside_or_in_front_of_a_surface_are_not_seen_through_it() -> None:
+    assert count_seen_through([1.8] * 4, [(2.0, 0.0), (8.0, 2.5), (4.0, 0.0)], [0.5] * 3) == 0
+
+
+def test_ground_seen_through_a_wall_is_counted() -> None:
+    flat = flat_view(AHEAD[:2], TWO_WALLS[:1], heights=1.5, supports=[(6.0, 0.0), (3.0, 0.0)])
+    assert doubts(flat).features == 1
+
+
+def test_ground_seen_over_a_kerb_is_not_seen_through_it() -> None:
+    flat = flat_view(AHEAD[:2], TWO_WALLS[:1], heights=0.2, supports=[(6.0, 0.0)])
+    assert doubts(flat).against.tolist() == [0.0]
+    assert doubts(flat).features == 0
+
+
+def test_nothing_is_seen_through_without_surfaces_or_features() -> None:
+    for flat in (flat_view(supports=[(6.0, 0.0), (3.0, 0.0)]), flat_view()):
+        found = doubts(flat)
+        assert (len(found.against), len(found.hiding), found.features) == (0, 0, 0)
+
+
+# What outnumbers
+
+GROUND = [(8.0, -0.06), (8.0, 0.0), (8.0, 0.06), (8.0, 0.12)]
+
+
+@pytest.mark.parametrize(("through", "range_"), [(0, 3.0), (1, 3.0), (2, 9.0), (4, 9.0)])
+def test_two_features_seen_through_a_lone_point_open_it_and_one_does_not(
+    through: int, range_: float
+) -> None:
+    # A stone, or a ghost, 3 m ahead and 0.8 m high; a wall 9 m ahead.
+    places = [(3.0, 0.0), (9.0, -4.0), (9.0, 4.0)]
+    flat = flat_view(places, [(1, 2)], heights=[0.45, 0.1, 0.1], supports=GROUND[:through])
+    flat = flat._replace(support_heights=np.full(through, -0.6))
+    assert sight(flat) == pytest.approx(range_)
+    found = doubts(flat)
+    assert found.hiding.tolist() == [True, through < 2]
+    assert found.belief[1] == (1.0 if through < 2 else 1.0 / (1.0 + through))
+
+
+@pytest.mark.parametrize(("through", "opens"), [(2, False), (3, True)])
+@pytest.mark.parametrize("kind", [SurfaceKind.SEGMENT, SurfaceKind.LINK])
+def test_it_takes_three_features_to_open_what_two_make_up(
+    through: int, opens: bool, kind: SurfaceKind
+) -> None:
+    segments = [(0, 1)] if kind == SurfaceKind.SEGMENT else []
+    flat = flat_view([(4, -0.2), (4, 0.2)], segments, heights=1.5, supports=GROUND[:through])
+    assert surfaces_of(flat).kind.tolist() == [kind]
+    found = doubts(flat)
+    assert found.against.tolist() == [through]
+    assert found.hiding.tolist() == [not opens]
+
+
+def test_a_wall_is_not_contradicted_by_the_many_features_seen_over_it() -> None:
+    rng = np.random.default_rng(3)
+    over = np.column_stack([np.full(50, 9.0), rng.uniform(-1.5, 1.5, size=50)])
+    flat = flat_view(
+        [(4.0, -1.0), (4.0, 1.0), *over.tolist()], [(0, 1)], heights=[0.5, 0.5, *[0.4] * 50]
+    )
+    assert doubts(flat).features == 0
+    assert sight(flat) == pytest.approx(4.0)
+
+
+def test_a_pole_with_nothing_seen_through_it_hides_though_all_around_is_seen() -> None:
+    around = [(9.0, y) for y in (-1.5, -1.0, -0.5, 0.5, 1.0, 1.5)]
+    flat = flat_view([(4.0, 0.0)], heights=0.45, supports=around)
+    found = doubts(flat)
+    assert (found.against.tolist(), found.belief.tolist(), found.features) == ([0.0], [1.0], 0)
+    assert sight(flat) == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize(("through", "range_"), [(0, 10.0 / 3.0), (1, 5.0), (2, 9.0)])
+def test_a_doubtful_link_closes_what_nothing_is_seen_through(through: int, range_: float) -> None:
+    # Two posts 1.2 m apart: a wall without texture between them, or an open door.
+    places = [(5.0, -0.6), (5.0, 0.6), (9.0, -4.0), (9.0, 4.0)]
+    flat = flat_view(places, [(2, 3)], heights=0.45, supports=[(5.5, -0.2), (5.5, 0.1)][:through])
+    found, surfaces = doubts(flat), surfaces_of(flat)
+    link = surfaces.kind == SurfaceKind.DOUBTFUL
+    assert link.sum() == 1
+    assert found.against[link] == through
+    assert found.hiding[link] == (through < 2)
+    assert found.features == 0  # a link that nobody believes is not contradicted either
+    # It ends sight, but grants nothing: the lines to the posts do, and the ground beyond.
+    assert sight(flat) == pytest.approx(range_)
+
+
+# Gaps between lines of sight
+
+
+def random_lines(rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Bearings, ascending, some equal, and ranges, some equal."""
+    count = int(rng.integers(0, 25))
+    bearings = rng.uniform(-3.1, 3.1, size=count) * rng.choice([0.1, 0.5, 1.0])
+    ranges = rng.uniform(0.5, 12.0, size=count)
+    if count > 4:
+        bearings[1], ranges[3] = bearings[0], ranges[2]
+    order = np.argsort(bearings, kind="stable")
+    return bearings[order], ranges[order]
+
+
+@settings(max_examples=200)
+@given(rngs(), st.sampled_from([0.0, 0.3, 0.8, 3.0]))
+def test_neighbours_say_what_all_pairs_of_lines_say(
+    rng: np.random.Generator, widest: float
+) -> None:
+    bearings, ranges = random_lines(rng)
+    ts = rng.uniform(-np.pi, np.pi, size=400)
+    np.testing.assert_allclose(
+        farthest(gap_chords(bearings, ranges, widest), ts),
+        farthest(all_chords(bearings, ranges, widest), ts),
+        rtol=1e-9,
+    )
+
+
+@settings(max_examples=200)
+@given(rngs(), st.sampled_from([0.3, 0.8, 3.0]))
+def test_a_place_is_vouched_for_if_the_lines_beside_it_are_near_enough_there(
+    rng: np.random.Generator, widest: float
+) -> None:
+    bearings, ranges = random_lines(rng)
+    ts, rhos = rng.uniform(-3.1, 3.1, size=300), rng.uniform(0.05, 12.0, size=300)
+    reached = farthest(gap_chords(bearings, ranges, widest), ts)
+    for t, rho, range_ in zip(ts, rhos, reached, strict=True):
+        right, left = (
+            bearings[(ranges >= rho) & (bearings <= t)],
+            bearings[(ranges >= rho) & (bearings > t)],
+        )
+        gap = left.min() - right.max() if len(left) and len(right) else np.inf
+        vouched = gap < 1.5 and 2 * rho * np.sin(gap / 2) <= widest
+        # A chord is nearer than the arc between its ends, by the cosine of half the gap at most.
+        if range_ >= rho:
+            assert vouched
+        if vouched:
+            assert range_ >= rho * np.cos(gap / 2) - 1e-9
+
+
+def test_chords_turn_counter_clockwise() -> None:
+    chords = gap_chords(*random_lines(np.random.default_rng(1)), 0.8)
+    assert len(chords) > 10
+    first, last = np.moveaxis(chords, 1, 0)
+    assert (first[:, 0] * last[:, 1] - first[:, 1] * last[:, 0] > 0).all()
+
+
+@settings(max_examples=100)
+@given(rngs(), st.sampled_from(["ellipsoid", "radius", "none"]))
+def test_lines_to_low_obstacles_count_as_far_as_surely_before_them(
+    rng: np.random.Generator, model: Literal["ellipsoid", "radius", "none"]
+) -> None:
+    options = MapperSettings(uncertainty=model, support_width=1e-9)
+    points = rng.uniform((0.4, -4.0), (9.0, 4.0), size=(12, 2))
+    sigma = rng.uniform(0.0, 0.5, size=12)
+    flat = flat_view(
+        points,
+        heights=rng.uniform(0.2, 1.2, size=12),
+        covariance=sigma**2,
+        supports=rng.uniform((0.4, -4.0), (9.0, 4.0), size=(6, 2)),
+        camera_height=1.4,
+    )
+    low = flat.heights <= 0.7
+    reach = np.where(model == "none", 0.0, 2.0 * sigma[low])
+    lines = np.concatenate([flat.supports, points[low]])
+    ranges = np.hypot(*lines.T) - np.append(np.zeros(6), reach)
+    kept = ranges > 0.3
+    bearings = np.arctan2(lines[kept, 1], lines[kept, 0])
+    ts = rng.uniform(-1.5, 1.5, size=300)
+    np.testing.assert_allclose(
+        farthest(support_chords(flat, options), ts),
+        farthest(all_chords(bearings, ranges[kept], 0.8), ts),
+        rtol=1e-9,
+    )
