@@ -11,6 +11,7 @@ from groundmap.errors import InputError
 from groundmap.grid import ConfidenceGrid
 from groundmap.heights import FlatView
 from groundmap.kernels.raster import draw_surfaces, fill_star
+from groundmap.lines_of_sight import missing_ground
 from groundmap.settings import MapperSettings
 from groundmap.sight2d import SightFan
 from groundmap.surfaces import SurfaceKind, Surfaces
@@ -92,8 +93,13 @@ def evidence_of(
 
 
 def drop_off_cells(flat: FlatView, grid: ConfidenceGrid) -> Ints:
-    """Return the cells ``[row, col]`` under features below the ground, each once."""
-    cells = np.floor(_CellsOf(flat, grid)(flat.drop_offs)).astype(np.int64)
+    """Return the cells ``[row, col]`` where the ground is missing, each once.
+
+    Those under features below the ground, and those that their lines of sight pass over between
+    the ground's level and the feature: had there been ground, it would have been in the way.
+    """
+    places = np.concatenate([flat.drop_offs, missing_ground(flat, 0.5 * grid.resolution)])
+    cells = np.floor(_CellsOf(flat, grid)(places)).astype(np.int64)
     return np.unique(cells[:, ::-1], axis=0)
 
 

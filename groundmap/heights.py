@@ -27,6 +27,8 @@ class FlatView(NamedTuple):
     viewpoint: Floats  #: shape (2,) [m, map]
     forward: Floats  #: shape (2,), unit vector [map]: x of the frame ``view``
     camera_height: float  #: [m] above the ground plane
+    border: float  #: tangent of the bearing of the left image's borders
+    baseline: float  #: [m]
     points: Floats  #: shape (n, 2) [m, view], obstacle points and ends of obstacle segments
     covariance: Floats  #: shape (n, 2, 2) [m², view]
     heights: Floats  #: shape (n,) [m] above the ground plane
@@ -35,6 +37,7 @@ class FlatView(NamedTuple):
     support_heights: Floats  #: shape (k,) [m]
     feature: Ints  #: shape (n + k,), which feature of the view each point and support is of
     drop_offs: Floats  #: shape (b, 2) [m, view], features below the ground
+    drop_off_heights: Floats  #: shape (b,) [m], below 0
     used: int  #: features that are in any of the above
     dropped: Counter[str]  #: features that are not, by reason
 
@@ -106,6 +109,8 @@ def flatten(view: View, settings: MapperSettings) -> FlatView:
         viewpoint=T_map_camera[:2, 3],
         forward=forward,
         camera_height=float(plane.height(view.rig.T_base_camera[:3, 3])),
+        border=view.rig.cx / view.rig.fx if view.rig.cx > 0 else np.inf,
+        baseline=view.rig.baseline,
         points=np.concatenate([part.xy for part in obstacles]),
         covariance=np.concatenate([part.covariance for part in obstacles]),
         heights=np.concatenate([part.height for part in obstacles]),
@@ -113,7 +118,8 @@ def flatten(view: View, settings: MapperSettings) -> FlatView:
         supports=np.concatenate([part.xy for part in grounds]),
         support_heights=np.concatenate([part.height for part in grounds]),
         feature=np.concatenate([part.feature for part in (*obstacles, *grounds)]),
-        drop_offs=np.concatenate([part.below for part in parts]),
+        drop_offs=np.concatenate([part.below[:, :2] for part in parts]),
+        drop_off_heights=np.concatenate([part.below[:, 2] for part in parts]),
         used=sum(part.used for part in parts),
         dropped=+dropped,
     )
@@ -148,7 +154,7 @@ def _measure(
 class _Classes(NamedTuple):
     obstacles: _Heights
     ground: _Heights
-    below: Floats
+    below: Floats  # shape (b, 3): place and height
     used: int
 
 
@@ -167,7 +173,7 @@ def _point_classes(points: _Heights, settings: MapperSettings, dropped: Counter[
     return _Classes(
         _pick(points, obstacle),
         _pick(points, ground),
-        points.xy[below],
+        np.column_stack([points.xy[below], points.height[below]]),
         int(obstacle.sum() + ground.sum()),
     )
 
@@ -192,7 +198,7 @@ def _segment_classes(
     return _Classes(
         _each(pieces, lambda field: field.reshape(-1, *field.shape[2:])),
         _sampled(_pick(segments, ground.any), np.stack(ground, axis=1)[ground.any], settings),
-        segments.xy[below].mean(axis=1),
+        np.column_stack([segments.xy[below].mean(axis=1), segments.height[below].mean(axis=1)]),
         int(used.sum()),
     )
 

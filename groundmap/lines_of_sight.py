@@ -13,7 +13,9 @@ from groundmap.settings import MapperSettings
 from groundmap.surfaces import SurfaceKind, Surfaces
 from groundmap.uncertainty import MODELS
 
-BELOW = 0.1  # [m], sight that passes this little below a top may have passed over it
+DEEPEST_SIGHT = 3.0  # [m], along the ground: longer lines below it are mostly false matches
+BESIDE = 0.15  # [m], a ground feature this near to a line of sight is beside it
+BELOW = 0.05  # [m], sight that passes this little below a top may have passed over it
 BEHIND = 0.05  # [m], a feature this little behind a surface is on it
 THIN = 0.02  # [m], half-width of the thinnest pole: beside it, one sees past a lone point
 # How many features make up a surface; if more are seen through it, it hides nothing.
@@ -100,18 +102,34 @@ def support_chords(flat: FlatView, settings: MapperSettings) -> Floats:
     reach and no more than `sight_gap` lies between: nothing wider fits in unseen. Lines to
     obstacles count as far as before the obstacle, if they come down low enough.
     """
-    return np.concatenate([_single_chords(flat.supports, settings), _gaps(flat, settings)])
+    return np.concatenate([_single_chords(flat, settings), _gaps(flat, settings)])
 
 
-def _single_chords(supports: Floats, settings: MapperSettings) -> Floats:
-    radius = np.hypot(supports[:, 0], supports[:, 1])
+def _single_chords(flat: FlatView, settings: MapperSettings) -> Floats:
+    radius = np.hypot(flat.supports[:, 0], flat.supports[:, 1])
+    bearing = np.arctan2(flat.supports[:, 1], flat.supports[:, 0])
     half = np.minimum(settings.support_width / radius, settings.support_angle)
-    ray = supports / radius[:, None]
-    cos, sin = np.cos(half)[:, None], np.sin(half)[:, None]
-    side = np.stack([-ray[:, 1], ray[:, 0]], axis=1)
-    return radius[:, None, None] * np.stack(
-        [ray * cos - side * sin, ray * cos + side * sin], axis=1
+    right, left = _borders(flat, radius)
+    ends = np.stack(
+        [
+            np.maximum(bearing - half, np.minimum(right, bearing)),
+            np.minimum(bearing + half, np.maximum(left, bearing)),
+        ],
+        axis=1,
     )
+    chords: Floats = radius[:, None, None] * np.stack([np.cos(ends), np.sin(ends)], axis=-1)
+    return chords
+
+
+def _borders(flat: FlatView, radius: Floats) -> tuple[Floats, Floats]:
+    """Return between which bearings both images see, at ranges, shape (n,) [rad].
+
+    The left image ends on both sides as far from its axis; the right one, a baseline to the right,
+    ends before it on the left.
+    """
+    border = np.arctan(flat.border)
+    blind = np.arcsin(np.minimum(flat.baseline * np.cos(border) / radius, 1.0))
+    return np.full(len(radius), -border), border - blind
 
 
 def _gaps(flat: FlatView, settings: MapperSettings) -> Floats:
@@ -126,3 +144,32 @@ def _gaps(flat: FlatView, settings: MapperSettings) -> Floats:
     order = np.argsort(bearings, kind="stable")
     order = order[ranges[order] > settings.min_range]
     return gap_chords(bearings[order], ranges[order], settings.sight_gap)
+
+
+def missing_ground(flat: FlatView, step: float) -> Floats:
+    """Return places, `step` [m] apart, that lines of sight to features below the ground pass over.
+
+    From where they go below the ground's level up to the feature, shape (n, 2) [m, view]. A line
+    that ground features lie beside there is that of a false match, and is left out.
+    """
+    range_at_end = np.hypot(flat.drop_offs[:, 0], flat.drop_offs[:, 1])
+    entry = flat.camera_height / (flat.camera_height - flat.drop_off_heights)
+    gap = range_at_end * (1.0 - entry)
+    rows = np.flatnonzero((gap <= DEEPEST_SIGHT) & ~_beside_ground(flat, entry * range_at_end))
+    counts = np.ceil(gap[rows] / step).astype(np.int64)
+    line = np.repeat(rows, counts)
+    number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    share = entry[line] + (1.0 - entry[line]) * (number + 0.5) / np.repeat(counts, counts)
+    places: Floats = flat.drop_offs[line] * share[:, None]
+    return places
+
+
+def _beside_ground(flat: FlatView, entry: Floats) -> Bools:
+    """Return which lines have a ground feature beside them beyond their entry, in metres."""
+    ray = flat.drop_offs / np.hypot(flat.drop_offs[:, 0], flat.drop_offs[:, 1])[:, None]
+    along = ray @ flat.supports.T
+    across = ray[:, :1] * flat.supports[:, 1] - ray[:, 1:] * flat.supports[:, 0]
+    end = (ray * flat.drop_offs).sum(axis=1)
+    between = (along > entry[:, None] + BESIDE) & (along < end[:, None] - BESIDE)
+    beside: Bools = np.logical_or.reduce(between & (np.abs(across) < BESIDE), axis=1)
+    return beside

@@ -80,6 +80,9 @@ class MapperSettings(Settings):
     doubt: float = Field(
         3.0, ge=1, description="unbelieved links up to this many times as long still end sight"
     )
+    halo: float = Field(
+        0.15, ge=0, description="what a feature is on may go on as far as this beside it [m]"
+    )
     smoothing: float = Field(
         0.25, ge=0, description="features this near across the line of sight are averaged [m]"
     )

@@ -25,28 +25,28 @@ def smoothed(flat: FlatView, settings: MapperSettings) -> FlatView:
     they are. Their covariance shrinks accordingly, to a quarter at most. Ground features are left
     alone.
     """
-    if settings.smoothing == 0 or len(flat.points) == 0:
-        return flat
     radius = np.hypot(flat.points[:, 0], flat.points[:, 1])
-    ray = flat.points / radius[:, None]
-    along = np.einsum("ni,nij,nj->n", ray, flat.covariance, ray)
-    sigma = np.maximum(np.sqrt(along) / radius**2, LEAST_SIGMA)
     bearings = np.arctan2(flat.points[:, 1], flat.points[:, 0])
     order = np.argsort(bearings, kind="stable")
+    order = order[radius[order] >= settings.min_range]  # segments may begin below the camera
+    if settings.smoothing == 0 or len(order) == 0:
+        return flat
+    ray = flat.points[order] / radius[order, None]
+    along = np.einsum("ni,nij,nj->n", ray, flat.covariance[order], ray)
+    sigma = np.maximum(np.sqrt(along) / radius[order] ** 2, LEAST_SIGMA)
     inverse, deviation = np.empty(len(order)), np.empty(len(order))
     smooth_along_rays(
         bearings[order],
         1.0 / radius[order],
-        sigma[order],
+        sigma,
         settings.smoothing,
         GATE,
         inverse,
         deviation,
     )
-    back = np.empty_like(order)
-    back[order] = np.arange(len(order))
-    stretch = 1.0 / (inverse[back] * radius)  # new range / old one
-    shrink = np.clip(deviation[back] / sigma, SUREST, 1.0)
+    stretch, shrink = np.ones(len(radius)), np.ones(len(radius))
+    stretch[order] = 1.0 / (inverse * radius[order])  # new range / old one
+    shrink[order] = np.clip(deviation / sigma, SUREST, 1.0)
     return flat._replace(
         points=flat.points * stretch[:, None],
         covariance=flat.covariance * (shrink**2)[:, None, None],

@@ -15,7 +15,6 @@ from groundmap.triangulation import Mesh
 from groundmap.uncertainty import MODELS
 
 RADIAL = 1e-9  # [rad], an edge that spans less is seen end-on
-HALO = 0.3  # of a believed link: as far as that, what a feature is on may go on beside it
 FRONTIER = 255  # the kind of an edge that is no surface
 SHARE_OF_FOOTPRINT = 0.8  # a link shorter than this share of the narrowest robot stops that robot
 
@@ -100,7 +99,7 @@ def find_surfaces(flat: FlatView, mesh: Mesh, settings: MapperSettings) -> Surfa
     # However unsure a point is, its disc hides no more than a link to a neighbour would.
     bound = _longest_link(np.hypot(discs.xy[:, 0], discs.xy[:, 1]), settings)
     radius = np.maximum(0.5 * settings.resolution, np.minimum(discs.sigma, bound))
-    beside = _beside(vertices, ~near, settings)
+    beside = _beside(vertices, ~near & (settings.halo > 0), settings)
     ends = _Vertices(*(np.concatenate(pair) for pair in zip(ends, beside, strict=True)))
     kinds = np.concatenate([kinds, np.full(len(beside.xy), SurfaceKind.DOUBTFUL)])
     everything = np.concatenate([ends.xy, _silhouettes(discs.xy, radius)])
@@ -192,8 +191,7 @@ def _away_from_viewpoint(
 def _beside(vertices: _Vertices, which: Bools, settings: MapperSettings) -> _Vertices:
     """Return where what a feature is on may go on: to both sides, across the line of sight."""
     some = _Vertices(*(values[which] for values in vertices))
-    radius = np.hypot(some.xy[:, 0], some.xy[:, 1])
-    half = HALO * _longest_link(radius, settings)
+    half = np.full(len(some.xy), settings.halo)
     left, right = np.moveaxis(_silhouettes(some.xy, half), 1, 0)
     halves = np.concatenate([np.stack([left, some.xy], axis=1), np.stack([some.xy, right], axis=1)])
     others = (np.concatenate([_twice(values)] * 2) for values in some[1:])

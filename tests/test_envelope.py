@@ -1,4 +1,4 @@
-"""Upper envelopes of edges by bearing, against a maximum over many bearings."""
+"""What bounds sight by bearing: nearest edges, supports, gaps; against many single bearings."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 
 from groundmap.arrays import Bools, Floats, Ints
 from groundmap.kernels.envelope import join_envelopes, upper_envelope
-from oracles import inverse_ranges, sight_ranges
+from groundmap.kernels.lines import gap_chords
+from oracles import farthest, inverse_ranges, sight_ranges
+from oracles import gap_chords as all_chords
 from strategies import rngs
 
 DENSE = np.linspace(-np.pi, np.pi, 4001)[1:-1] + 1e-5
@@ -185,3 +187,60 @@ def test_narrow_gaps_are_filled(gap: float, alone: bool) -> None:
     assert edge.tolist() == [7, 0, 7, 1, 7]
     assert second.tolist() == [True, False, True, False, True]
     np.testing.assert_array_equal(out_high[:-1], out_low[1:])
+
+
+# Gaps between lines of sight
+
+
+def random_lines(rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Bearings, ascending, some equal, and ranges, some equal."""
+    count = int(rng.integers(0, 25))
+    bearings = rng.uniform(-3.1, 3.1, size=count) * rng.choice([0.1, 0.5, 1.0])
+    ranges = rng.uniform(0.5, 12.0, size=count)
+    if count > 4:
+        bearings[1], ranges[3] = bearings[0], ranges[2]
+    order = np.argsort(bearings, kind="stable")
+    return bearings[order], ranges[order]
+
+
+@settings(max_examples=200)
+@given(rngs(), st.sampled_from([0.0, 0.3, 0.8, 3.0]))
+def test_neighbours_say_what_all_pairs_of_lines_say(
+    rng: np.random.Generator, widest: float
+) -> None:
+    bearings, ranges = random_lines(rng)
+    ts = rng.uniform(-np.pi, np.pi, size=400)
+    np.testing.assert_allclose(
+        farthest(gap_chords(bearings, ranges, widest), ts),
+        farthest(all_chords(bearings, ranges, widest), ts),
+        rtol=1e-9,
+    )
+
+
+@settings(max_examples=200)
+@given(rngs(), st.sampled_from([0.3, 0.8, 3.0]))
+def test_a_place_is_vouched_for_if_the_lines_beside_it_are_near_enough_there(
+    rng: np.random.Generator, widest: float
+) -> None:
+    bearings, ranges = random_lines(rng)
+    ts, rhos = rng.uniform(-3.1, 3.1, size=300), rng.uniform(0.05, 12.0, size=300)
+    reached = farthest(gap_chords(bearings, ranges, widest), ts)
+    for t, rho, range_ in zip(ts, rhos, reached, strict=True):
+        right, left = (
+            bearings[(ranges >= rho) & (bearings <= t)],
+            bearings[(ranges >= rho) & (bearings > t)],
+        )
+        gap = left.min() - right.max() if len(left) and len(right) else np.inf
+        vouched = gap < 1.5 and 2 * rho * np.sin(gap / 2) <= widest
+        # A chord is nearer than the arc between its ends, by the cosine of half the gap at most.
+        if range_ >= rho:
+            assert vouched
+        if vouched:
+            assert range_ >= rho * np.cos(gap / 2) - 1e-9
+
+
+def test_chords_turn_counter_clockwise() -> None:
+    chords = gap_chords(*random_lines(np.random.default_rng(1)), 0.8)
+    assert len(chords) > 10
+    first, last = np.moveaxis(chords, 1, 0)
+    assert (first[:, 0] * last[:, 1] - first[:, 1] * last[:, 0] > 0).all()

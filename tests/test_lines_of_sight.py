@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from groundmap.arrays import Bools, Floats
 from groundmap.heights import FlatView
-from groundmap.kernels.lines import gap_chords, passed_through
+from groundmap.kernels.lines import passed_through
 from groundmap.lines_of_sight import Contradictions, contradictions, support_chords
 from groundmap.settings import MapperSettings
-from groundmap.sight2d import visible_freespace
+from groundmap.sight2d import NO_SURFACE, SightFan, visible_freespace
 from groundmap.surfaces import SurfaceKind, Surfaces, find_surfaces
 from groundmap.triangulation import triangulate
 from oracles import counted_against, farthest
@@ -258,7 +258,7 @@ def test_nothing_is_seen_through_without_surfaces_or_features() -> None:
 
 # What outnumbers
 
-GROUND = [(8.0, -0.06), (8.0, 0.0), (8.0, 0.06), (8.0, 0.12)]
+GROUND = [(8.0, -0.02), (8.0, 0.0), (8.0, 0.02), (8.0, 0.04)]
 
 
 @pytest.mark.parametrize(("through", "range_"), [(0, 3.0), (1, 3.0), (2, 9.0), (4, 9.0)])
@@ -268,7 +268,7 @@ def test_two_features_seen_through_a_lone_point_open_it_and_one_does_not(
     # A stone, or a ghost, 3 m ahead and 0.8 m high; a wall 9 m ahead.
     places = [(3.0, 0.0), (9.0, -4.0), (9.0, 4.0)]
     flat = flat_view(places, [(1, 2)], heights=[0.45, 0.1, 0.1], supports=GROUND[:through])
-    flat = flat._replace(support_heights=np.full(through, -0.6))
+    flat = flat._replace(support_heights=np.full(through, -1.0))
     assert sight(flat) == pytest.approx(range_)
     found = doubts(flat)
     assert found.hiding.tolist() == [True, through < 2]
@@ -321,61 +321,7 @@ def test_a_doubtful_link_closes_what_nothing_is_seen_through(through: int, range
     assert sight(flat) == pytest.approx(range_)
 
 
-# Gaps between lines of sight
-
-
-def random_lines(rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Bearings, ascending, some equal, and ranges, some equal."""
-    count = int(rng.integers(0, 25))
-    bearings = rng.uniform(-3.1, 3.1, size=count) * rng.choice([0.1, 0.5, 1.0])
-    ranges = rng.uniform(0.5, 12.0, size=count)
-    if count > 4:
-        bearings[1], ranges[3] = bearings[0], ranges[2]
-    order = np.argsort(bearings, kind="stable")
-    return bearings[order], ranges[order]
-
-
-@settings(max_examples=200)
-@given(rngs(), st.sampled_from([0.0, 0.3, 0.8, 3.0]))
-def test_neighbours_say_what_all_pairs_of_lines_say(
-    rng: np.random.Generator, widest: float
-) -> None:
-    bearings, ranges = random_lines(rng)
-    ts = rng.uniform(-np.pi, np.pi, size=400)
-    np.testing.assert_allclose(
-        farthest(gap_chords(bearings, ranges, widest), ts),
-        farthest(all_chords(bearings, ranges, widest), ts),
-        rtol=1e-9,
-    )
-
-
-@settings(max_examples=200)
-@given(rngs(), st.sampled_from([0.3, 0.8, 3.0]))
-def test_a_place_is_vouched_for_if_the_lines_beside_it_are_near_enough_there(
-    rng: np.random.Generator, widest: float
-) -> None:
-    bearings, ranges = random_lines(rng)
-    ts, rhos = rng.uniform(-3.1, 3.1, size=300), rng.uniform(0.05, 12.0, size=300)
-    reached = farthest(gap_chords(bearings, ranges, widest), ts)
-    for t, rho, range_ in zip(ts, rhos, reached, strict=True):
-        right, left = (
-            bearings[(ranges >= rho) & (bearings <= t)],
-            bearings[(ranges >= rho) & (bearings > t)],
-        )
-        gap = left.min() - right.max() if len(left) and len(right) else np.inf
-        vouched = gap < 1.5 and 2 * rho * np.sin(gap / 2) <= widest
-        # A chord is nearer than the arc between its ends, by the cosine of half the gap at most.
-        if range_ >= rho:
-            assert vouched
-        if vouched:
-            assert range_ >= rho * np.cos(gap / 2) - 1e-9
-
-
-def test_chords_turn_counter_clockwise() -> None:
-    chords = gap_chords(*random_lines(np.random.default_rng(1)), 0.8)
-    assert len(chords) > 10
-    first, last = np.moveaxis(chords, 1, 0)
-    assert (first[:, 0] * last[:, 1] - first[:, 1] * last[:, 0] > 0).all()
+# What is granted
 
 
 @settings(max_examples=100)
@@ -405,3 +351,75 @@ def test_lines_to_low_obstacles_count_as_far_as_surely_before_them(
         farthest(all_chords(bearings, ranges[kept], 0.8), ts),
         rtol=1e-9,
     )
+
+
+# A wall 6 m ahead, seen from 1 m up
+
+
+def reaches(fan: SightFan, bearing: float = 0.0) -> float:
+    return float(farthest(fan.ends, np.array([bearing]))[0])
+
+
+def seen(flat: FlatView, options: MapperSettings = SHARP) -> SightFan:
+    return visible_freespace(flat, surfaces_of(flat, options), options)
+
+
+WALL = [(6.0, -2.0), (6.0, 2.0)]
+
+
+def test_a_wall_seen_high_up_only_grants_nothing() -> None:
+    fan = seen(flat_view(WALL, [(0, 1)], heights=0.6))
+    assert len(fan.ends) == 0
+    granted = seen(flat_view(WALL, [(0, 1)], heights=0.5))
+    assert reaches(granted) == pytest.approx(6.0)
+
+
+def test_a_wall_seen_low_at_one_end_grants() -> None:
+    for heights in ([0.4, 1.9], [1.9, 0.4]):
+        fan = seen(flat_view(WALL, [(0, 1)], heights=heights))
+        assert reaches(fan, 0.3) == pytest.approx(6.0 / np.cos(0.3))
+
+
+def test_how_high_is_too_high_is_a_share_of_the_cameras_height() -> None:
+    view = flat_view(WALL, [(0, 1)], heights=0.6, camera_height=1.3)
+    assert reaches(seen(view)) == pytest.approx(6.0)
+    strict = MapperSettings(uncertainty="none", grant_height=0.4)
+    assert reaches(seen(view, strict)) == 0.0
+
+
+def test_before_a_high_wall_freespace_reaches_as_far_as_the_ground_that_was_seen() -> None:
+    fan = seen(flat_view(WALL, [(0, 1)], heights=1.2, supports=[(3.0, 0.0)]))
+    assert reaches(fan) == pytest.approx(3.0 * np.cos(0.05))
+    assert reaches(fan, 0.06) == 0.0
+    assert fan.surface.tolist() == [NO_SURFACE]
+
+
+def test_ground_seen_below_a_high_wall_grants_up_to_the_wall() -> None:
+    fan = seen(flat_view(WALL, [(0, 1)], heights=1.2, supports=[(8.0, 0.0)]))
+    assert reaches(fan) == pytest.approx(6.0)
+    assert fan.surface.tolist() == [0]
+    assert np.abs(fan.bearings).max() < 0.05
+
+
+def test_lines_of_sight_side_by_side_grant_what_is_between_them() -> None:
+    supports = [(5.0, -0.3), (5.0, 0.4)]
+    fan = seen(flat_view(supports=supports), MapperSettings(support_width=0.01))
+    assert reaches(fan) == pytest.approx(5.0, abs=0.01)
+    wider = seen(flat_view(supports=[(5.0, -0.4), (5.0, 0.5)]), MapperSettings(support_width=0.01))
+    # They are 0.9 m apart at 5 m, so 0.8 m apart nearer by.
+    assert reaches(wider) == pytest.approx(5.0 * 0.8 / 0.9, rel=0.01)
+
+
+def test_the_middle_of_a_gap_between_high_features_is_not_granted() -> None:
+    for height, range_ in ((0.6, 0.0), (0.4, 5.0)):
+        flat = flat_view([(5.0, -0.35), (5.0, 0.35)], heights=height)
+        options = MapperSettings(link_length=0.0, link_angle=0.0)
+        assert reaches(seen(flat, options)) == pytest.approx(range_)
+
+
+def test_a_lone_obstacle_grants_up_to_a_reach_before_it() -> None:
+    # The lines to both vouch for the gap, as far as both surely reach.
+    flat = flat_view([(5.0, -0.35), (5.0, 0.35)], heights=0.4, covariance=0.2**2)
+    options = MapperSettings(link_length=0.0, link_angle=0.0)
+    radius = np.hypot(5.0, 0.35) - 2 * 0.2
+    assert reaches(seen(flat, options)) == pytest.approx(radius * 5.0 / np.hypot(5.0, 0.35))

@@ -326,12 +326,6 @@ def test_freespace_ends_a_reach_before_the_surface(room: Cloud, rng: np.random.G
         np.testing.assert_allclose(free, expected, rtol=0, atol=1e-8)
 
 
-def width(ends: Floats) -> Floats:
-    bearings = np.arctan2(ends[..., 1], ends[..., 0])
-    apart: Floats = np.abs(np.angle(np.exp(1j * (bearings[:, 1] - bearings[:, 0]))))
-    return apart
-
-
 @settings(max_examples=100)
 @given(rooms(), rngs())
 def test_freespace_is_never_behind_a_surface_that_hides(
@@ -339,86 +333,17 @@ def test_freespace_is_never_behind_a_surface_that_hides(
 ) -> None:
     fan, surfaces = seen(uncertain(room, rng), SPREAD)
     assume(len(surfaces.ends) > 0)
-    share = rng.uniform(size=(len(fan.free), 5, 1))
-    places = fan.free[:, None, 0] * (1.0 - share) + fan.free[:, None, 1] * share
+    # In a triangle narrower than rounding, all places are right at the end of some surface.
+    free = fan.free[np.diff(fan.bearings)[:, 0] > 1e-9]
+    share = rng.uniform(size=(len(free), 5, 1))
+    places = free[:, None, 0] * (1.0 - share) + free[:, None, 1] * share
     places = places.reshape(-1, 2)
     radius = np.hypot(*places.T)
     places, radius = places[radius > 1e-6], radius[radius > 1e-6]
     # One that is seen end-on, at a single bearing, hides by its disc.
-    hiding = surfaces.ends[fan.contradictions.hiding & (width(surfaces.ends) > 1e-9)]
+    hiding = surfaces.ends[fan.contradictions.hiding & (np.linalg.det(surfaces.ends) > 1e-9)]
     inverse = inverse_ranges(hiding, np.arctan2(places[:, 1], places[:, 0]))
     inverse = inverse.max(axis=0, initial=-np.inf)
     with np.errstate(divide="ignore"):
         nearest = np.where(inverse > 0, 1.0 / np.maximum(inverse, 0.0), np.inf)
     assert (radius <= nearest * (1 + 1e-9)).all()
-
-
-# A wall 6 m ahead, seen from 1 m up
-
-
-def reaches(fan: SightFan, bearing: float = 0.0) -> float:
-    return float(farthest(fan.ends, np.array([bearing]))[0])
-
-
-WALL = [(6.0, -2.0), (6.0, 2.0)]
-
-
-def test_a_wall_seen_high_up_only_grants_nothing() -> None:
-    fan, surfaces = seen(flat_view(WALL, [(0, 1)], heights=0.6))
-    assert len(fan.ends) == 0
-    assert surfaces.kind.tolist() == [0]
-    granted, _ = seen(flat_view(WALL, [(0, 1)], heights=0.5))
-    assert reaches(granted) == pytest.approx(6.0)
-
-
-def test_a_wall_seen_low_at_one_end_grants() -> None:
-    for heights in ([0.4, 1.9], [1.9, 0.4]):
-        fan, _ = seen(flat_view(WALL, [(0, 1)], heights=heights))
-        assert reaches(fan, 0.3) == pytest.approx(6.0 / np.cos(0.3))
-
-
-def test_how_high_is_too_high_is_a_share_of_the_cameras_height() -> None:
-    view = flat_view(WALL, [(0, 1)], heights=0.6, camera_height=1.3)
-    assert reaches(seen(view)[0]) == pytest.approx(6.0)
-    strict = MapperSettings(uncertainty="none", grant_height=0.4)
-    assert reaches(seen(view, strict)[0]) == 0.0
-
-
-def test_before_a_high_wall_freespace_reaches_as_far_as_the_ground_that_was_seen() -> None:
-    fan, _ = seen(flat_view(WALL, [(0, 1)], heights=1.2, supports=[(3.0, 0.0)]))
-    assert reaches(fan) == pytest.approx(3.0 * np.cos(0.05))
-    assert reaches(fan, 0.06) == 0.0
-    assert fan.surface.tolist() == [NO_SURFACE]
-
-
-def test_ground_seen_below_a_high_wall_grants_up_to_the_wall() -> None:
-    fan, _ = seen(flat_view(WALL, [(0, 1)], heights=1.2, supports=[(8.0, 0.0)]))
-    assert reaches(fan) == pytest.approx(6.0)
-    assert fan.surface.tolist() == [0]
-    assert np.abs(fan.bearings).max() < 0.05
-
-
-def test_lines_of_sight_side_by_side_grant_what_is_between_them() -> None:
-    supports = [(5.0, -0.3), (5.0, 0.4)]
-    fan, _ = seen(flat_view(supports=supports), MapperSettings(support_width=0.01))
-    assert reaches(fan) == pytest.approx(5.0, abs=0.01)
-    wider, _ = seen(
-        flat_view(supports=[(5.0, -0.4), (5.0, 0.5)]), MapperSettings(support_width=0.01)
-    )
-    # They are 0.9 m apart at 5 m, so 0.8 m apart nearer by.
-    assert reaches(wider) == pytest.approx(5.0 * 0.8 / 0.9, rel=0.01)
-
-
-def test_the_middle_of_a_gap_between_high_features_is_not_granted() -> None:
-    for height, range_ in ((0.6, 0.0), (0.4, 5.0)):
-        flat = flat_view([(5.0, -0.35), (5.0, 0.35)], heights=height)
-        options = MapperSettings(link_length=0.0, link_angle=0.0)
-        assert reaches(seen(flat, options)[0]) == pytest.approx(range_)
-
-
-def test_a_lone_obstacle_grants_up_to_a_reach_before_it() -> None:
-    # The lines to both vouch for the gap, as far as both surely reach.
-    flat = flat_view([(5.0, -0.35), (5.0, 0.35)], heights=0.4, covariance=0.2**2)
-    options = MapperSettings(link_length=0.0, link_angle=0.0)
-    radius = np.hypot(5.0, 0.35) - 2 * 0.2
-    assert reaches(seen(flat, options)[0]) == pytest.approx(radius * 5.0 / np.hypot(5.0, 0.35))

@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
+from scipy import ndimage
 
-from groundmap.arrays import Floats
+import groundmap
+from groundmap import GroundMapper, View
+from groundmap.arrays import Bools, Floats
 from groundmap.uncertainty import MODELS, Ellipsoid, Exact, Radius
-from strategies import rngs
+from groundmap.window import CellState
+from strategies import pixels_of, pose, rig, rngs
 
 DIRECTIONS = np.linspace(0.0, np.pi, 20001)
 
@@ -143,3 +147,79 @@ def test_only_a_radius_has_caps(model: str) -> None:
     reach = np.array([[0.2, 0.5]])
     expected = reach if model == "radius" else np.zeros((1, 2))
     np.testing.assert_array_equal(MODELS[model].caps(reach), expected)
+
+
+# A doorway, 1.0 m wide, approached
+
+WALL, HALF_DOOR, EYE = 10.0, 0.5, 1.0
+
+
+def doorway(rng: np.random.Generator, distance: float) -> View:
+    """View of a wall across the way with a door in it, with half a pixel of noise."""
+    stereo = rig(mounted=True)
+    here = WALL - distance
+    sides = np.array([-1.0, 1.0])
+    posts = np.repeat(HALF_DOOR + np.array([0.0, 0.35, 0.7, 1.1, 1.5]), 2) * np.tile(sides, 5)
+    low_high = np.array([0.1, 1.9])
+    vertical = np.stack(
+        [np.stack([np.full(2, WALL), np.full(2, y), low_high], axis=1) for y in posts]
+    )
+    boards = np.array(
+        [
+            [(WALL, side * HALF_DOOR, height), (WALL, side * (HALF_DOOR + 1.6), height)]
+            for side in sides
+            for height in (0.3, 1.2, 1.8)
+        ]
+    )
+    beside = rng.uniform((HALF_DOOR, 0.2), (HALF_DOOR + 1.6, 1.9), size=(60, 2))
+    on_wall = np.column_stack([np.full(60, WALL), beside[:, 0] * np.tile(sides, 30), beside[:, 1]])
+    floor = rng.uniform((here + 0.5, -0.45), (WALL + 5.0, 0.45), size=(120, 2))
+    seen = visible_pixels(stereo, here, np.concatenate([on_wall, np.pad(floor, ((0, 0), (0, 1)))]))
+    cut = visible_pixels(stereo, here, np.concatenate([vertical, boards]))
+    return View.from_pixels(
+        pose(here - 0.2, -0.06, 0.0, mounted=True),
+        stereo,
+        points_px=seen + rng.normal(scale=0.5, size=seen.shape),
+        segments_px=cut + rng.normal(scale=0.5, size=cut.shape),
+    )
+
+
+def visible_pixels(stereo: groundmap.StereoRig, here: float, places: Floats) -> Floats:
+    """Pixels of features that lie in the images of a camera `EYE` up at x = `here`."""
+    x, y, z = np.moveaxis(places, -1, 0)
+    pixels = pixels_of(stereo, np.stack([-y, EYE - z, x - here], axis=-1))
+    inside = (pixels > 0) & (pixels < (2 * stereo.cx, 2 * stereo.cx, 2 * stereo.cy))
+    return pixels[inside.reshape(len(pixels), -1).all(axis=1)]
+
+
+def door_map(model: str) -> groundmap.ConfidenceGrid:
+    rng = np.random.default_rng(20)
+    approach = [doorway(rng, distance) for distance in np.arange(6.0, 0.9, -0.25)]
+    mapper = GroundMapper(uncertainty=model)
+    for view in groundmap.fit_ground(approach, camera_height=EYE):
+        mapper.integrate(view)
+    return mapper.grid
+
+
+def test_a_door_stays_open_and_the_wall_beside_it_closed() -> None:
+    grid = door_map("ellipsoid")
+    through = grid.window((WALL - 0.6, -0.3, WALL + 0.6, 0.3))
+    assert (through.states() == CellState.FREE).all()
+    beside = grid.window((WALL - 1.0, -1.5, WALL + 1.0, 1.5))
+    free = beside.states() == CellState.FREE
+    assert joins_front_and_back(free)
+    x, y = np.moveaxis(
+        beside.cell_to_world(np.argwhere(np.ones_like(free))).reshape(*free.shape, 2), -1, 0
+    )
+    wall = np.abs(y) > HALF_DOOR
+    assert not joins_front_and_back(free & wall)
+    stands = wall & (np.abs(x - WALL) < grid.resolution / 2)
+    assert stands.any()
+    assert (beside.states()[stands] == CellState.NONFREE).all()
+
+
+def joins_front_and_back(free: Bools) -> bool:
+    """Whether a path through free cells, side by side, leads from low x to high x."""
+    label, _ = ndimage.label(free)
+    front, back = set(label[:, 0].tolist()), set(label[:, -1].tolist())
+    return bool((front & back) - {0})

@@ -11,7 +11,7 @@ from numba import njit
 from groundmap.arrays import Bools, Floats
 
 WIDEST_GAP = 1.5  # [rad], between two lines: a chord must not pass the viewpoint
-NARROWEST_GAP = 1e-9  # [rad]
+NARROWEST_GAP = 1e-9  # [rad], and of a surface: nothing is seen through one seen end-on
 
 
 @njit(cache=True, nogil=True)
@@ -51,7 +51,7 @@ def passed_through(
         x0, y0 = ends[s, 0, 0], ends[s, 0, 1]
         ex, ey = ends[s, 1, 0] - x0, ends[s, 1, 1] - y0
         first, last = np.arctan2(y0, x0), np.arctan2(ends[s, 1, 1], ends[s, 1, 0])
-        if last < first:  # across the seam, behind the camera
+        if last - first < NARROWEST_GAP:  # seen end-on, or across the seam, behind the camera
             continue
         square = ex * ex + ey * ey
         row = np.searchsorted(bearings, first)

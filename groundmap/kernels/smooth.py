@@ -34,7 +34,8 @@ def smooth_along_rays(
     gate : float
         How far their inverse ranges differ [standard deviations of the difference].
     smoothed, deviation : ndarray, shape (n,)
-        Set to the fit at the feature's own bearing and its standard deviation.
+        Set to the fit at the feature's own bearing and its standard deviation. No feature is moved
+        nearer or farther than all of its neighbours: a steep fit may leave the half-line of sight.
     """
     count = len(bearings)
     for i in range(count):
@@ -45,7 +46,7 @@ def smooth_along_rays(
         while last + 1 < count and bearings[last + 1] - bearings[i] <= width:
             last += 1
         s0 = s1 = s2 = t0 = t1 = 0.0
-        neighbours = 0
+        neighbours, farthest, nearest = 0, inverse[i], inverse[i]
         for k in range(first, last + 1):
             apart = inverse[k] - inverse[i]
             if apart * apart > gate * gate * (sigma[i] ** 2 + sigma[k] ** 2):
@@ -54,6 +55,7 @@ def smooth_along_rays(
             s0, s1, s2 = s0 + weight, s1 + weight * x, s2 + weight * x * x
             t0, t1 = t0 + weight * inverse[k], t1 + weight * inverse[k] * x
             neighbours += 1
+            farthest, nearest = min(farthest, inverse[k]), max(nearest, inverse[k])
         determinant = s0 * s2 - s1 * s1
         if neighbours < FEWEST:
             smoothed[i], deviation[i] = inverse[i], sigma[i]
@@ -62,3 +64,4 @@ def smooth_along_rays(
             deviation[i] = np.sqrt(s2 / determinant)
         else:
             smoothed[i], deviation[i] = t0 / s0, np.sqrt(1.0 / s0)
+        smoothed[i] = min(max(smoothed[i], farthest), nearest)

@@ -118,9 +118,9 @@ class _Sight:
         """Add one view; `there` tells which samples are on a surface now."""
         eye = T_map_camera[:2, 3]
         ahead = in_images(self.centres, T_map_camera, sensor, reach) & ~self.visible
-        self.visible |= _clear(prisms, eye, self.centres, ahead)
-        self.in_line |= self.visible
-        self.in_line |= _clear(prisms, eye, self.centres, ~self.in_line)
+        self.visible[_clear(prisms, eye, self.centres, ahead)] = True
+        self.in_line[self.visible] = True
+        self.in_line[_clear(prisms, eye, self.centres, ~self.in_line)] = True
         ahead = in_images(self.samples, T_map_camera, sensor, reach) & ~self.surfaces_seen
         self.surfaces_seen |= _clear(prisms, eye, self.samples, ahead & there)
 

@@ -62,6 +62,7 @@ class Scenario:
     path: Path  #: of its file
     why: str  #: the reason that it exists
     seed: int
+    level_ground: bool  #: whether the ground is given, instead of fitted
     log: Path | None
     world: WorldGenerator | None
     solids: tuple[SolidSettings, ...]
@@ -126,6 +127,9 @@ class _Head(Settings):
 
     why: str = Field(min_length=1, description="the reason that the scenario exists")
     seed: int = Field(0, ge=0, description="of all random numbers")
+    level_ground: bool = Field(
+        False, description="give the ground's planes, level and where they are, instead of fitting"
+    )
     world: dict[str, Any] | None = None
     log: dict[str, Any] | None = None
     sensor: dict[str, Any] = Field(default_factory=dict)
@@ -150,6 +154,7 @@ def _scenario(path: Path, content: dict[str, Any]) -> Scenario:
         path=path,
         why=" ".join(head.why.split()),
         seed=head.seed,
+        level_ground=head.level_ground,
         log=None if head.log is None else path.parent / LogSettings(**head.log).path,
         world=None if head.world is None else _generator(world, path.parent),
         solids=tuple(SolidSettings(**table) for table in solids),

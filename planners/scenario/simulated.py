@@ -31,7 +31,9 @@ def simulate(scenario: Scenario) -> Simulated:
     assert scenario.drive is not None
     moves = drive(scenario.drive, np.random.default_rng((scenario.seed, 1)))
     mapper = GroundMapper(**scenario.mapper.model_dump())
-    for view in fit_ground(views_of(scenario, world, moves), **scenario.ground.model_dump()):
+    height = scenario.sensor.camera_height if scenario.level_ground else None
+    views = views_of(scenario, world, moves)
+    for view in fit_ground(views, camera_height=height, **scenario.ground.model_dump()):
         mapper.integrate(view)
     window = mapper.grid.window(_bounds(world, mapper.grid))
     truth = truth_of(world, moves, scenario.sensor, window, scenario.mapper)
