@@ -5,15 +5,17 @@ apart in greyscale, too: free is the lightest, unknown darker, contested darker 
 nearly black.
 """
 
-from groundmap.draw.curves import draw_curves
-from groundmap.draw.figure import check_picture, new_figure, save_figure
+from groundmap.draw.case import draw_case
+from groundmap.draw.curves import curves_png, draw_curves
+from groundmap.draw.figure import check_picture, figure_png, new_figure, save_figure
 from groundmap.draw.maps import draw_grid, draw_trajectory, draw_verdicts, known_bounds
 from groundmap.draw.routes import draw_route
-from groundmap.draw.truth import draw_case, draw_difference, draw_truth, figure_png
+from groundmap.draw.truth import draw_difference, draw_truth
 from groundmap.draw.views import draw_view
 
 __all__ = [
     "check_picture",
+    "curves_png",
     "draw_case",
     "draw_curves",
     "draw_difference",

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundmap.arrays import as_floats, check_finite
+from groundmap.draw.figure import figure_png
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -66,3 +67,12 @@ def _count_axis(ax: Axes, counts: npt.NDArray[np.float64]) -> None:
     ax.set_xticks([], minor=True)
     ax.set_xlabel("features in the view")
     ax.grid(color="0.9", linewidth=0.8)
+
+
+def curves_png(curves: Mapping[str, npt.ArrayLike], *, dpi: int = 100) -> bytes:
+    """Return a PNG of `draw_curves` on two axes side by side."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.0, 4.4), layout="constrained")
+    draw_curves(curves, ax=figure.subplots(1, 2))
+    return figure_png(figure, dpi=dpi)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -68,6 +69,13 @@ def save_figure(figure: Figure, path: str | PathLike[str], *, dpi: int = 130) ->
     check_picture(path)
     suffix = Path(path).suffix.lower()
     write_atomically(path, lambda stream: figure.savefig(stream, format=suffix[1:], dpi=dpi))
+
+
+def figure_png(figure: Figure, dpi: int = 110) -> bytes:
+    """Return a figure as the bytes of a PNG file."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=dpi)
+    return stream.getvalue()
 
 
 def check_picture(path: str | PathLike[str]) -> None:

@@ -98,7 +98,8 @@ def truth_of(
 
 
 def _within(bounds: tuple[float, float, float, float], places: Floats) -> Bools:
-    inside: Bools = ((places >= bounds[:2]) & (places <= bounds[2:])).all(axis=1)
+    within = (places >= bounds[:2]) & (places <= bounds[2:])
+    inside: Bools = np.logical_and.reduce(within, axis=1)
     return inside
 
 
