@@ -15,7 +15,7 @@ from groundmap.arrays import Bools, Floats, Ints
 from groundmap.evidence import Evidence
 from groundmap.heights import FlatView
 from groundmap.sight2d import SightFan
-from groundmap.surfaces import Surfaces
+from groundmap.surfaces import SurfaceKind, Surfaces
 from groundmap.triangulation import Mesh
 
 Cell: TypeAlias = tuple[int, int]
@@ -134,14 +134,36 @@ def visible_region(surfaces: Floats, chords: Floats) -> shapely.Geometry:
     return shapely.union(seen, ground)
 
 
-def support_chords(supports: Floats, width: float, angle: float) -> Floats:
-    """Chord of each ground feature: its range, at bearings within min(width / range, angle)."""
-    radius = np.hypot(supports[:, 0], supports[:, 1])
-    half = np.minimum(width / radius, angle)
-    bearing = np.arctan2(supports[:, 1], supports[:, 0])
-    both = bearing[:, None] + np.stack([-half, half], axis=1)
-    chords: Floats = radius[:, None, None] * np.stack([np.cos(both), np.sin(both)], axis=-1)
-    return chords
+def support_chords(flat: FlatView, width: float, angle: float) -> Floats:
+    """Chord of each ground feature: its range, at bearings within min(width / range, angle).
+
+    A chord ends where an image does, but reaches up to its feature in any case.
+    """
+    chords = []
+    for x, y in flat.supports.tolist():
+        radius, bearing = np.hypot(x, y), np.arctan2(y, x)
+        half = min(width / radius, angle)
+        right, left = seen_between(flat, radius)
+        low, high = bearing - half, bearing + half
+        if low < right:
+            low = min(right, bearing)
+        if high > left:
+            high = max(left, bearing)
+        chords.append([(radius * np.cos(t), radius * np.sin(t)) for t in (low, high)])
+    return np.array(chords, dtype=np.float64).reshape(-1, 2, 2)
+
+
+def seen_between(flat: FlatView, radius: float) -> tuple[float, float]:
+    """Bearings of the right and the left end of what both images see on a circle.
+
+    On the left that is where the circle meets y + baseline = border x, the right image's border.
+    """
+    if np.isinf(flat.border):
+        return -np.pi / 2, np.pi / 2
+    slope, baseline = flat.border, flat.baseline
+    inside = max((1 + slope**2) * radius**2 - baseline**2, 0.0)
+    x = (slope * baseline + np.sqrt(inside)) / (1 + slope**2)
+    return float(np.arctan2(-slope, 1.0)), float(np.arctan2(slope * x - baseline, x))
 
 
 def gap_chords(bearings: Floats, ranges: Floats, widest: float) -> Floats:
@@ -186,6 +208,8 @@ def counted_against(
     """For each surface, how many features are seen through it, by their shares; and which ones.
 
     By `slack`, a share of its length, a surface is taken to be longer (or shorter) at either end.
+    What passes less than 0.05 m below a top may have passed over it, unless the surface is
+    doubtful; of a lone point no more counts than 0.02 m to either side.
     Surfaces across the seam, behind the camera, and those seen end-on are passed by nothing.
     """
     places = np.concatenate([flat.points, flat.supports]).tolist()
@@ -193,6 +217,10 @@ def counted_against(
     rows = Counter(flat.feature.tolist())
     against, which = np.zeros(len(surfaces.ends)), [set[int]() for _ in surfaces.ends]
     for s, (first, last) in enumerate(surfaces.ends):
+        below = 0.0 if surfaces.kind[s] == SurfaceKind.DOUBTFUL else 0.05
+        if surfaces.discs[s] > 0.02:
+            middle, share = 0.5 * (first + last), 0.02 / surfaces.discs[s]
+            first, last = (middle + share * (end - middle) for end in (first, last))
         if np.arctan2(*last[::-1]) - np.arctan2(*first[::-1]) < 1e-9:
             continue
         for (x, y), height, feature in zip(places, heights, flat.feature.tolist(), strict=True):
@@ -206,7 +234,7 @@ def counted_against(
                 (1 - t) * pair[0] + t * pair[1] for pair in (surfaces.reach[s], surfaces.tops[s])
             )
             behind = np.hypot(x, y) * (1 - share) > 2 * reach + 0.05
-            if behind and (1 - share) * flat.camera_height + share * height < top:
+            if behind and (1 - share) * flat.camera_height + share * height < top - below:
                 against[s] += 1 / rows[feature]
                 which[s].add(feature)
     return against, which

@@ -149,12 +149,20 @@ def flat_view(
     supports: npt.ArrayLike = (),
     support_heights: npt.ArrayLike = 0.0,
     camera_height: float = 1.0,
+    drop_offs: npt.ArrayLike = (),
+    drop_off_heights: npt.ArrayLike = -1.0,
+    border: float = np.inf,
+    baseline: float = 0.0,
     viewpoint: tuple[float, float] = (0.0, 0.0),
     forward: tuple[float, float] = (1.0, 0.0),
 ) -> FlatView:
-    """Build a view by hand; a covariance is a variance in all directions, or matrices."""
+    """Build a view by hand; a covariance is a variance in all directions, or matrices.
+
+    Its images have no borders unless they are given.
+    """
     xy = np.asarray(points, dtype=np.float64).reshape(-1, 2)
     ground = np.asarray(supports, dtype=np.float64).reshape(-1, 2)
+    below = np.asarray(drop_offs, dtype=np.float64).reshape(-1, 2)
     spread = np.asarray(covariance, dtype=np.float64)
     if spread.ndim < 2:
         spread = spread[..., None, None] * np.eye(2)
@@ -165,6 +173,8 @@ def flat_view(
         viewpoint=np.array(viewpoint),
         forward=np.array(forward),
         camera_height=camera_height,
+        border=border,
+        baseline=baseline,
         points=xy,
         covariance=np.broadcast_to(spread, (len(xy), 2, 2)).copy(),
         heights=np.broadcast_to(np.asarray(heights, dtype=np.float64), len(xy)).copy(),
@@ -174,7 +184,10 @@ def flat_view(
             np.asarray(support_heights, dtype=np.float64), len(ground)
         ).copy(),
         feature=feature,
-        drop_offs=np.empty((0, 2)),
+        drop_offs=below,
+        drop_off_heights=np.broadcast_to(
+            np.asarray(drop_off_heights, dtype=np.float64), len(below)
+        ).copy(),
         used=len(xy) + len(ground),
         dropped=Counter(),
     )

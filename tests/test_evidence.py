@@ -65,9 +65,9 @@ def around(parts: ViewParts) -> Floats:
 
 
 def on(parts: ViewParts) -> Floats:
-    """z on each surface itself: six times as much, if nothing contradicts it up to 1."""
+    """z on each surface itself: four times as much, if nothing contradicts it up to 1."""
     belief = parts.fan.contradictions.belief
-    z: Floats = np.minimum(6.0 * around(parts) / belief, 1.0) * belief
+    z: Floats = np.minimum(4.0 * around(parts) / belief, 1.0) * belief
     return z
 
 
@@ -310,8 +310,10 @@ def test_the_resolution_is_refused_if_a_view_takes_too_many_cells() -> None:
 
 
 def test_drop_offs_are_counted_once_per_cell() -> None:
-    flat = flat_view(viewpoint=(0.01, 0.02), forward=(0.0, 1.0))
-    flat = flat._replace(drop_offs=np.array([(1.0, 0.5), (1.01, 0.49), (3.0, -2.0)]))
+    places = [(1.0, 0.5), (1.01, 0.49), (3.0, -2.0)]
+    flat = flat_view(
+        viewpoint=(0.01, 0.02), forward=(0.0, 1.0), drop_offs=places, drop_off_heights=-0.01
+    )
     # Ahead is y of the map, left is -x.
     cells = drop_off_cells(flat, ConfidenceGrid(resolution=0.5))
     assert sorted(map(tuple, cells.tolist())) == [(2, -1), (6, 4)]

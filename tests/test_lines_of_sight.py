@@ -22,7 +22,7 @@ from oracles import counted_against, farthest
 from oracles import gap_chords as all_chords
 from strategies import Cloud, flat_view, rngs, rooms
 
-SHARP = MapperSettings(uncertainty="none")
+SHARP = MapperSettings(uncertainty="none", halo=0.0)
 MADE_OF = np.array([2.0, 2.0, 1.0, 1.0])  # features: segment, link, lone point, doubtful link
 
 
@@ -129,6 +129,7 @@ def passed(
     *,
     reach: float = 0.0,
     top: float = 1.5,
+    below: float = 0.0,
 ) -> Passed:
     """What the kernel counts for one surface, seen from 1 m up."""
     places = np.array(points)
@@ -145,6 +146,7 @@ def passed(
         np.ones(len(points)),
         1.0,
         0.05,
+        below,
         against,
         passes,
     )
@@ -226,12 +228,13 @@ def test_half_a_segment_seen_through_a_ghost_is_half_a_contradiction() -> None:
     assert doubts(flat).against.tolist() == [0.5, 0.0]
 
 
-@pytest.mark.parametrize(("height", "count"), [(0.99, 1), (1.01, 0)])
+@pytest.mark.parametrize(("height", "count"), [(0.89, 1), (0.91, 0)])
 def test_the_line_of_sight_is_compared_with_the_top_where_it_passes(
     height: float, count: int
 ) -> None:
     # A top that falls from 1.5 m to 0.5 m is 1.0 m high in the middle, where a ray to a point
-    # of `height` at twice the range passes at the mean of 1.0 m and `height`.
+    # of `height` at twice the range passes at the mean of 1.0 m and `height`: 0.05 m lower is
+    # below it.
     assert count_seen_through([1.5, 0.5, 1.8, 1.8], [(8.0, 0.0)], [height]) == count
 
 

@@ -18,7 +18,8 @@ from groundmap.surfaces import SurfaceKind, Surfaces, find_surfaces
 from groundmap.triangulation import triangulate
 from strategies import Cloud, flat_view, level_view, rngs, rooms
 
-OPTIONS = MapperSettings()
+OPTIONS = MapperSettings(halo=0.0)  # mesh edges and lone points alone
+HALOED = MapperSettings()
 
 
 def surfaces_of(flat: FlatView, options: MapperSettings = OPTIONS) -> Surfaces:
@@ -46,7 +47,7 @@ def longest_link(nearer: float, options: MapperSettings) -> float:
 def test_edges_are_links_by_length_range_and_height_and_frontiers_else(
     rng: np.random.Generator, footprint: float, link_height: float
 ) -> None:
-    options = MapperSettings(narrowest_footprint=footprint, link_height=link_height)
+    options = MapperSettings(narrowest_footprint=footprint, link_height=link_height, halo=0.0)
     points = rng.uniform((0.5, -4.0), (19.0, 4.0), size=(rng.integers(4, 80), 2))
     height = rng.uniform(0.2, 1.5, size=len(points))
     range_ = np.hypot(*points.T)
@@ -96,7 +97,7 @@ def test_edges_are_links_by_length_range_and_height_and_frontiers_else(
 def test_a_link_is_believed_up_to_its_bound(
     distance: float, length: float, footprint: float, linked: bool
 ) -> None:
-    options = MapperSettings(narrowest_footprint=footprint, doubt=1)
+    options = MapperSettings(narrowest_footprint=footprint, doubt=1, halo=0.0)
     surfaces = surfaces_of(flat_view([(distance, 0), (distance, length)]), options)
     kind = SurfaceKind.LINK if linked else SurfaceKind.LONE
     assert set(surfaces.kind.tolist()) == {kind}
@@ -120,7 +121,7 @@ def test_a_link_is_believed_up_to_its_bound(
 def test_an_unbelieved_link_is_doubtful_up_to_a_multiple_of_its_bound(
     distance: float, length: float, footprint: float, doubt: float, doubtful: bool
 ) -> None:
-    options = MapperSettings(narrowest_footprint=footprint, doubt=doubt)
+    options = MapperSettings(narrowest_footprint=footprint, doubt=doubt, halo=0.0)
     flat = flat_view([(distance, 0), (distance, length)])
     surfaces = surfaces_of(flat, options)
     found = of_kind(surfaces, SurfaceKind.DOUBTFUL)
@@ -177,7 +178,7 @@ def test_segments_are_kept_outside_the_near_range_and_only_there(room: Cloud) ->
 @settings(max_examples=100)
 @given(rooms())
 def test_ends_turn_counter_clockwise_around_the_viewpoint(room: Cloud) -> None:
-    surfaces = surfaces_of(flat_view(room.points, room.segments))
+    surfaces = surfaces_of(flat_view(room.points, room.segments), HALOED)
     first, last = np.moveaxis(surfaces.ends, 1, 0)
     assert (first[:, 0] * last[:, 1] - first[:, 1] * last[:, 0] >= 0).all()
 
@@ -198,7 +199,7 @@ def test_an_edge_within_the_near_range_is_counted_and_dropped() -> None:
 
 
 def test_a_doubtful_link_within_the_near_range_is_dropped_and_not_counted() -> None:
-    options = MapperSettings(link_length=0.1, link_angle=0.0, min_range=1.0)
+    options = MapperSettings(link_length=0.1, link_angle=0.0, min_range=1.0, halo=0.0)
     # One link lies inside, two end there; the two lone points inside are what is counted.
     surfaces = surfaces_of(flat_view([(0.8, 0.0), (0.8, 0.2), (1.1, 0.0)]), options)
     assert (np.hypot(*np.moveaxis(surfaces.ends, -1, 0)) >= 1.0 - 1e-9).all()
@@ -223,7 +224,7 @@ def test_a_post_within_the_near_range_is_no_surface() -> None:
 def test_a_lone_point_is_a_disc_of_half_a_cell_or_its_sigma(
     model: Literal["none", "ellipsoid", "radius"], sigma: float
 ) -> None:
-    options = MapperSettings(uncertainty=model)
+    options = MapperSettings(uncertainty=model, halo=0.0)
     surfaces = surfaces_of(flat_view([(6, 3)], covariance=sigma**2, heights=0.7), options)
     radius = max(options.resolution / 2.0, 0.0 if model == "none" else sigma)
     assert surfaces.kind.tolist() == [SurfaceKind.LONE]
@@ -290,7 +291,7 @@ def test_every_surface_has_a_height_and_a_reach(room: Cloud, rng: np.random.Gene
         heights=rng.uniform(0.2, 1.9, size=count),
         covariance=rng.uniform(0.0, 0.3, size=count) ** 2,
     )
-    surfaces = surfaces_of(flat)
+    surfaces = surfaces_of(flat, HALOED)
     assert ((surfaces.bottoms >= 0.2 - 1e-9) & (surfaces.tops <= 1.9 + 1e-9)).all()
     assert (surfaces.bottoms <= surfaces.tops).all()
     assert ((surfaces.reach >= 0) & (surfaces.reach <= 0.6 + 1e-9)).all()

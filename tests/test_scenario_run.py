@@ -1,0 +1,322 @@
+"""Scenarios, run: what holds passes, what does not says so, and what can't be is no traceback."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+
+from groundmap import read_views, write_views
+from groundmap.errors import FileFormatError
+from planners.scenario.outcome import Bound, Figure, Outcome
+from planners.scenario.run import run_scenario
+
+# A hall with a box in it, seen by an ideal sensor from one corner.
+HALL = """
+why = "A tiny hall with a box."
+seed = 1
+level_ground = true
+[world]
+bounds = [0, 0, 6, 4]
+[[world.solids]]
+wall = [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]
+[[world.solids]]
+box = [2.5, 1.5, 3.5, 2.2]
+[scan]
+bearing = 0.5
+ground = 0.15
+[drive]
+stops = [[1, 1, 0], [1, 1, 60]]
+every_turn = 2
+"""
+# Two rooms and no door; the robot is carried from one to the other.
+ROOMS = """
+why = "Two rooms without a door."
+level_ground = true
+[world]
+bounds = [0, 0, 6, 4]
+[[world.solids]]
+wall = [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]
+[[world.solids]]
+wall = [[3, 0], [3, 4]]
+[scan]
+bearing = 0.5
+ground = 0.15
+[drive]
+stops = [[0.4, 2, 0], [2.6, 2, 180], [5.8, 2, 180]]
+every = 10
+every_turn = 4
+"""
+MATCHED = "[sensor]\nmissing = 0.2\nfalse_matches = 0.05\n"
+
+
+def write(folder: Path, text: str) -> Path:
+    """Write a scenario into a folder, which is made if it isn't there."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "scenario.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def query(
+    name: str = "along",
+    *,
+    start: tuple[float, float] = (1.5, 1.0),
+    goal: tuple[float, float] = (4.0, 1.0),
+    footprint: float = 0.3,
+    more: str = "",
+) -> str:
+    """Return a query's table."""
+    places = f"start = {list(start)}\ngoal = {list(goal)}\nfootprint = {footprint}\n"
+    return f'[[queries]]\nname = "{name}"\n{places}{more}\n'
+
+
+def number(outcome: Outcome, name: str) -> float:
+    """Return a figure that is a number."""
+    value = outcome.figures[name]
+    assert isinstance(value, float | int)
+    return value
+
+
+def test_a_tiny_world_keeps_its_bounds(tmp_path: Path) -> None:
+    bounds = (
+        "[bounds]\nfree_recall = { min = 0.95 }\nfalse_free_beyond = { max = 0 }\n"
+        '"along.length" = { min = 2.4, max = 2.6 }\n'
+    )
+    text = HALL + query(more="robot_radius = 0.25\nmax_ratio = 1.1") + bounds
+    outcome = run_scenario(write(tmp_path / "hall", text))
+    assert (outcome.name, outcome.why) == ("hall", "A tiny hall with a box.")
+    assert (outcome.passed, outcome.missed, outcome.skipped) == (True, (), "")
+    assert list(outcome.bounds) == [
+        *("free_recall", "false_free_beyond", "along.length"),
+        *("along.outcome", "along.collisions", "along.ratio"),
+    ]
+    assert all(bound.holds(outcome.figures[name]) for name, bound in outcome.bounds.items())
+    assert number(outcome, "visible_m2") > 5.0
+    assert outcome.picture.startswith(b"\x89PNG")
+    assert outcome.seconds > 0
+
+
+def test_a_bound_that_does_not_hold_is_said_with_figure_and_bound(tmp_path: Path) -> None:
+    bounds = (
+        "[bounds]\nfree_recall = { min = 2 }\nvisible_m2 = { max = 1 }\n"
+        "false_free_beyond = { min = 0.3, max = 0.4 }\nfree_precision = { min = 0.9 }\n"
+    )
+    outcome = run_scenario(write(tmp_path, HALL + bounds))
+    assert outcome.passed is False
+    recall, visible = (f"{number(outcome, name):.4g}" for name in ("free_recall", "visible_m2"))
+    assert outcome.missed == (
+        f"free_recall is {recall}, not ≥ 2",
+        f"visible_m2 is {visible}, not ≤ 1",
+        "false_free_beyond is 0, not ≥ 0.3 and ≤ 0.4",
+    )
+
+
+def test_a_bound_on_what_is_no_figure_names_those_that_are(tmp_path: Path) -> None:
+    bounds = '[bounds]\nfree_recal = { min = 0 }\n"along.lenght" = { max = 9 }\n'
+    outcome = run_scenario(write(tmp_path, HALL + query() + bounds))
+    there = ", ".join(outcome.figures)
+    assert outcome.missed == (
+        f"there is no figure free_recal; there are {there}",
+        f"there is no figure along.lenght; there are {there}",
+    )
+    assert "free_recall, free_precision, " in there
+    assert "along.length" in there
+
+
+def test_errors_that_are_expected_pass_when_they_happen(tmp_path: Path) -> None:
+    queries = (
+        query("closed", start=(1.5, 2), goal=(5, 2), more='expect = "EnclosedError"'),
+        query("wall", start=(1.5, 2), goal=(2.8, 2), more='expect = "NonFreeError"'),
+        query("away", start=(1.5, 2), goal=(60, 2), more='expect = "OutsideMapError"'),
+        query("unseen", start=(1.5, 2), goal=(0.3, 0.3), more='expect = "UnknownSpaceError"'),
+    )
+    outcome = run_scenario(write(tmp_path, ROOMS + "".join(queries)))
+    assert (outcome.passed, outcome.missed) == (True, ())
+    assert [
+        outcome.figures[f"{name}.outcome"] for name in ("closed", "wall", "away", "unseen")
+    ] == [
+        "EnclosedError",
+        "NonFreeError",
+        "OutsideMapError",
+        "UnknownSpaceError",
+    ]
+    assert "closed.length" not in outcome.figures
+
+
+def test_an_error_that_is_not_expected_fails_with_its_reason(tmp_path: Path) -> None:
+    text = ROOMS + query("closed", start=(1.5, 2), goal=(5, 2))
+    outcome = run_scenario(write(tmp_path, text))
+    assert outcome.passed is False
+    assert outcome.missed[0].startswith("closed.outcome is EnclosedError, not = route (")
+    assert "(5.00, 2.00)" in outcome.missed[0]
+    assert outcome.missed[1:] == ("closed.collisions is None, not ≤ 0",)
+
+
+def test_a_route_where_an_error_is_expected_fails(tmp_path: Path) -> None:
+    text = HALL + query(more='expect = "EnclosedError"')
+    outcome = run_scenario(write(tmp_path, text))
+    assert outcome.missed == ("along.outcome is route, not = EnclosedError",)
+
+
+def test_a_planner_that_does_not_exist_fails_and_is_named(tmp_path: Path) -> None:
+    outcome = run_scenario(write(tmp_path, HALL + query(more='planner = "astra"')))
+    assert outcome.passed is False
+    assert "not = route (planner: expected one of astar" in outcome.missed[0]
+    assert "'astra'" in outcome.missed[0]
+
+
+def test_a_route_that_touches_the_true_world_collides(tmp_path: Path) -> None:
+    # Planned for a slim robot, between a wall and a box 1.4 m apart; driven by one of 1 m.
+    text = HALL + query(footprint=0.1, more="robot_radius = 1.0\nmax_ratio = 2")
+    outcome = run_scenario(write(tmp_path, text))
+    clearance = number(outcome, "along.true_clearance")
+    assert 0.1 <= clearance < 1.0
+    assert outcome.figures["along.outcome"] == "route"
+    assert number(outcome, "along.collisions") == 2  # the wall and the box
+    assert "along.collisions is 2, not ≤ 0" in outcome.missed
+    # Such a robot can't go there at all, so that there is nothing to compare with.
+    assert (outcome.figures["along.optimum"], outcome.figures["along.ratio"]) == (None, None)
+    assert "along.ratio is None, not ≤ 2" in outcome.missed
+    slim = run_scenario(write(tmp_path, HALL + query(footprint=0.1)))  # as large as planned for
+    assert (slim.passed, slim.figures["along.collisions"]) == (True, 0)
+
+
+@pytest.mark.parametrize("goal", [(4.0, 1.0), (1.5, 3.0), (2.2, 2.8)])
+def test_no_route_is_much_shorter_than_the_best_in_the_true_world(
+    tmp_path: Path, goal: tuple[float, float]
+) -> None:
+    outcome = run_scenario(write(tmp_path, HALL + query(goal=goal)))
+    length, optimum = (number(outcome, f"along.{name}") for name in ("length", "optimum"))
+    straight = math.dist((1.5, 1.0), goal)
+    assert length >= straight - 1e-9
+    assert optimum >= straight - 1e-9
+    assert number(outcome, "along.ratio") == pytest.approx(length / optimum)
+    assert 0.95 <= length / optimum <= 1.2
+
+
+def test_a_world_without_solids_has_nothing_to_come_near_to(tmp_path: Path) -> None:
+    wall = "[[world.solids]]\nwall = [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]\n"
+    box = "[[world.solids]]\nbox = [2.5, 1.5, 3.5, 2.2]\n"
+    outcome = run_scenario(write(tmp_path, HALL.replace(wall, "").replace(box, "") + query()))
+    assert outcome.passed is True
+    assert outcome.figures["along.true_clearance"] is None
+    assert outcome.figures["along.collisions"] == 0
+    assert outcome.figures["nonfree_recall"] is None
+
+
+def test_a_figure_of_nothing_keeps_to_no_bound(tmp_path: Path) -> None:
+    text = (
+        'why = "Nothing stands there."\nlevel_ground = true\n[world]\nbounds = [0, 0, 6, 4]\n'
+        "[scan]\nground = 0.2\n[drive]\nstops = [[1, 2, 0]]\n[bounds]\nnonfree_recall = { min = 0 }"
+    )
+    outcome = run_scenario(write(tmp_path, text))
+    assert outcome.missed == ("nonfree_recall is None, not ≥ 0",)
+
+
+@pytest.mark.parametrize("level", ["true", "false"])
+def test_a_world_without_features_fails_with_a_sentence(tmp_path: Path, level: str) -> None:
+    scan = "[scan]\nbearing = 0.5\nground = 0.15\n"
+    blind = HALL.replace(scan, "[sensor]\nmax_points = 0\nmax_segments = 0\n")
+    text = blind.replace("level_ground = true", f"level_ground = {level}")
+    outcome = run_scenario(write(tmp_path, text + query() + "[bounds]\nunknown = { max = 1 }\n"))
+    assert outcome.passed is False
+    assert outcome.missed == (
+        "InputError: grid: expected at least one known cell, got an empty map.",
+    )
+    assert (outcome.figures, outcome.picture) == ({}, b"")
+
+
+def test_a_map_that_is_not_there_fails_with_a_sentence(tmp_path: Path) -> None:
+    text = 'why = "No map."\n[world]\nkind = "image"\npath = "no.map"\n[drive]\nstops = [[0, 0, 0]]'
+    outcome = run_scenario(write(tmp_path, text))
+    assert outcome.passed is False
+    [sentence] = outcome.missed
+    assert sentence.startswith(f"FileFormatError: {tmp_path / 'no.map'}: expected a readable file")
+
+
+def test_a_missing_log_is_skipped_with_its_place(tmp_path: Path) -> None:
+    text = 'why = "A drive."\n[log]\npath = "no-log"\n[bounds]\n"views.ground_free" = { min = 2 }'
+    outcome = run_scenario(write(tmp_path / "drive", text))
+    assert (outcome.name, outcome.passed, outcome.missed) == ("drive", None, ())
+    assert outcome.skipped == f"there is no log {tmp_path / 'drive' / 'no-log'}"
+    assert outcome.figures == {}
+
+
+def test_a_log_is_judged_by_what_was_held_out_of_it(tmp_path: Path) -> None:
+    demo = read_views(str(files("planners") / "demo_data"))
+    write_views(itertools.islice(demo, 8), tmp_path / "views")
+    text = (
+        'why = "A drive."\n[log]\npath = "../views"\n[bounds]\n"views.ground_free" = { min = 0.5 }'
+        '\n"views.ground_fre" = { min = 0.5 }\n'
+    ) + query(start=(0, 0), goal=(2, 0), footprint=0.2, more='expect = "OutsideMapError"')
+    outcome = run_scenario(write(tmp_path / "drive", text))
+    about = {name.partition(".")[0] for name in outcome.figures}
+    assert about == {"views", "ids", "thin", "along"}
+    assert 0.5 < number(outcome, "views.ground_free") <= 1.0
+    assert outcome.picture.startswith(b"\x89PNG")
+    assert "along.collisions" not in outcome.bounds  # nobody knows what the route would touch
+    missing, *others = outcome.missed
+    assert missing.startswith("there is no figure views.ground_fre; there are views.")
+    assert all(sentence.startswith("along.outcome is ") for sentence in others)
+
+
+def test_a_log_that_is_none_fails_with_a_sentence(tmp_path: Path) -> None:
+    (tmp_path / "views").mkdir()
+    outcome = run_scenario(write(tmp_path, 'why = "A drive."\n[log]\npath = "views"\n'))
+    assert outcome.passed is False
+    assert outcome.missed[0].startswith(f"FileFormatError: {tmp_path / 'views'}: expected ")
+
+
+def test_the_same_seed_gives_the_same_figures_and_another_gives_others(tmp_path: Path) -> None:
+    scan = "[scan]\nbearing = 0.5\nground = 0.15\n"
+    text = HALL.replace(scan, MATCHED) + query()
+    first, again = (run_scenario(write(tmp_path / name, text)) for name in ("a", "b"))
+    other = run_scenario(write(tmp_path / "c", text.replace("seed = 1", "seed = 2")))
+    assert first.figures == again.figures
+    assert other.figures["free_recall"] != first.figures["free_recall"]
+
+
+def test_what_is_no_scenario_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(FileFormatError, match=r"scenario\.toml: expected a \[world\] or a \[log\]"):
+        run_scenario(write(tmp_path, 'why = "Nothing."'))
+
+
+@pytest.mark.parametrize(
+    ("bound", "value", "holds"),
+    [
+        (Bound(min=0.5), 0.5, True),
+        (Bound(min=0.5), 0.49, False),
+        (Bound(min=0.5), math.inf, True),
+        (Bound(max=0.5), 0.5, True),
+        (Bound(max=0.5), 0.51, False),
+        (Bound(max=0), 0, True),
+        (Bound(max=0), 1, False),
+        (Bound(min=1, max=2), 1.5, True),
+        (Bound(min=1, max=2), 0.5, False),
+        (Bound(min=1, max=2), 2.5, False),
+        (Bound(equals="route"), "route", True),
+        (Bound(equals="route"), "EnclosedError", False),
+        (Bound(equals="route"), None, False),
+        (Bound(equals=0), 0, True),
+        (Bound(equals=0), None, False),
+        (Bound(min=0.0), None, False),
+        (Bound(max=1.0), None, False),
+        (Bound(min=0.0), math.nan, False),
+        (Bound(max=1.0), math.nan, False),
+        (Bound(min=-math.inf, max=math.inf), math.nan, False),
+        (Bound(min=0.0), "route", False),
+    ],
+)
+def test_a_bound_holds_what_keeps_to_it_and_nothing_that_is_missing(
+    bound: Bound, value: Figure, holds: bool
+) -> None:
+    assert bound.holds(value) is holds
+
+
+def test_a_bound_reads_as_people_write_it() -> None:
+    bounds = Bound(min=0.97), Bound(max=0), Bound(min=1, max=2.5), Bound(equals="route")
+    assert [str(bound) for bound in bounds] == ["≥ 0.97", "≤ 0", "≥ 1 and ≤ 2.5", "= route"]
