@@ -44,6 +44,8 @@ unknown key. Did you mean 'resolution'?
         except ValidationError as error:
             first = error.errors()[0]
             name = ".".join(str(part) for part in first["loc"])
+            if first["type"] == "missing":
+                raise SettingsError(name, "a value", "none") from None
             expected = first["msg"].removeprefix("Input should be ")
             raise SettingsError(name, expected, repr(first["input"])) from None
 

@@ -1,4 +1,4 @@
-"""The command ``groundmap``: exit 0 done, 2 bad input or usage, 3 no route."""
+"""The command ``groundmap``: exit 0 done, 1 a scenario failed, 2 bad input or usage, 3 no route."""
 
 from __future__ import annotations
 

@@ -71,7 +71,8 @@ class SolidSettings(_Shaped):
         way = self._given("box", "polygon", "wall", "pole", "table")
         if way == "table":
             assert self.table is not None
-            return table(*self.table, height=self.top or TABLE_TOP, **options)
+            height = TABLE_TOP if self.top is None else self.top
+            return table(*self.table, height=height, **options)
         top = TOP if self.top is None else self.top
         return (Solid(self._outline(way), bottom=self.bottom, top=top, **options),)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+import shapely
 from pydantic import Field
 
 from groundmap.arrays import Floats
@@ -56,6 +57,8 @@ def scan(
         np.meshgrid(np.arange(xmin, xmax, settings.ground), np.arange(ymin, ymax, settings.ground)),
         axis=-1,
     ).reshape(-1, 2)
+    holes = shapely.union_all([hole.outline for hole in world.holes])
+    lattice = lattice[~shapely.intersects_xy(holes, lattice)]
     for pose, logged, time in zip(*moves, strict=True):
         T_map_camera = pose @ sensor.rig.T_base_camera
         obstacles = world.at(time).obstacles(*heights, opaque=True)

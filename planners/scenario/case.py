@@ -20,7 +20,6 @@ from groundmap.simulate.worlds import GENERATORS, WorldGenerator
 from planners.scenario.outcome import Bound
 
 FILE = "scenario.toml"
-TABLES = ("world", "log", "sensor", "scan", "drive", "mapper", "ground", "queries", "bounds")
 S = TypeVar("S", bound=Settings)
 
 
@@ -122,10 +121,10 @@ def _read(path: Path) -> dict[str, Any]:
         raise FileFormatError(path, "a TOML file", str(error)) from error
 
 
-class _Head(Settings):
+class ScenarioSettings(Settings):
     """What stands before the tables, and the tables' names."""
 
-    why: str = Field(min_length=1, description="the reason that the scenario exists")
+    why: str = Field(pattern=r"\S", description="the reason that the scenario exists")
     seed: int = Field(0, ge=0, description="of all random numbers")
     level_ground: bool = Field(
         False, description="give the ground's planes, level and where they are, instead of fitting"
@@ -142,38 +141,56 @@ class _Head(Settings):
 
 
 def _scenario(path: Path, content: dict[str, Any]) -> Scenario:
-    head = _Head(**content)
+    head = ScenarioSettings(**content)
     if (head.world is None) == (head.log is None):
-        raise InputError("scenario", "a [world] or a [log]", "both" if head.log else "neither")
+        got = "neither" if head.log is None else "both"
+        raise FileFormatError(path, "a [world] or a [log]", got)
     if head.world is not None and head.drive is None:
-        raise InputError("scenario", "a [drive] through its [world]", "none")
+        raise FileFormatError(path, "a [drive] through its [world]", "none")
     world = dict(head.world or {})
-    solids, holes = world.pop("solids", ()), world.pop("holes", ())
+    solids = tuple(SolidSettings(**table) for table in _tables(world, "solids"))
+    holes = tuple(HoleSettings(**table) for table in _tables(world, "holes"))
+    for solid in solids:  # what has no shape is refused here, not when it is run
+        solid.solids()
+    for hole in holes:
+        hole.hole()
+    queries = tuple(QuerySettings(**table) for table in head.queries)
+    names = [query.name for query in queries]
+    if len(set(names)) < len(names):
+        raise InputError("queries", "a name of its own for each", ", ".join(names))
     return Scenario(
-        name=path.parent.name if path.name == FILE else path.stem,
+        name=path.resolve().parent.name if path.name == FILE else path.stem,
         path=path,
         why=" ".join(head.why.split()),
         seed=head.seed,
         level_ground=head.level_ground,
         log=None if head.log is None else path.parent / LogSettings(**head.log).path,
         world=None if head.world is None else _generator(world, path.parent),
-        solids=tuple(SolidSettings(**table) for table in solids),
-        holes=tuple(HoleSettings(**table) for table in holes),
+        solids=solids,
+        holes=holes,
         sensor=SensorSettings(**head.sensor),
         scan=None if head.scan is None else ScanSettings(**head.scan),
         drive=None if head.drive is None else DriveSettings(**head.drive),
         mapper=MapperSettings(**head.mapper),
         ground=GroundSettings(**head.ground),
-        queries=tuple(QuerySettings(**table) for table in head.queries),
+        queries=queries,
         bounds={name: _bound(name, table) for name, table in head.bounds.items()},
     )
 
 
+def _tables(world: dict[str, Any], name: str) -> list[dict[str, Any]]:
+    """Take the tables of a name out of the world's."""
+    tables = world.pop(name, [])
+    if not isinstance(tables, list) or not all(isinstance(one, dict) for one in tables):
+        raise InputError(f"world.{name}", f"[[world.{name}]] tables", repr(tables))
+    return tables
+
+
 def _generator(table: dict[str, Any], folder: Path) -> WorldGenerator:
     kind = table.pop("kind", "empty")
-    if kind not in GENERATORS:
+    if not isinstance(kind, str) or kind not in GENERATORS:
         raise InputError("world.kind", f"one of {', '.join(sorted(GENERATORS))}", repr(kind))
-    if "path" in table:  # from the scenario's file on
+    if isinstance(table.get("path"), str):  # from the scenario's file on
         table["path"] = str(folder / table["path"])
     return GENERATORS[kind](**table)
 
@@ -182,4 +199,7 @@ def _bound(name: str, table: dict[str, Any]) -> Bound:
     bound = BoundSettings(**table)
     if bound.min is None and bound.max is None:
         raise InputError(f"bounds.{name}", "min, max, or both", "neither")
+    if bound.min is not None and bound.max is not None and bound.min > bound.max:
+        got = f"{bound.min:g} and {bound.max:g}"
+        raise InputError(f"bounds.{name}", "min of at most max", got)
     return Bound(min=bound.min, max=bound.max)

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from groundmap.errors import FileFormatError
 from planners.scenario.case import FILE
 from planners.scenario.outcome import Outcome
 from planners.scenario.run import run_scenario
@@ -43,8 +44,8 @@ class ScenarioItem(pytest.Item):
             raise BoundsMissedError(outcome)
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], *args: Any) -> Any:
-        """Say which bounds were missed; anything else is shown as usual."""
-        if isinstance(excinfo.value, BoundsMissedError):
+        """Say which bounds were missed, or what is wrong with the file."""
+        if isinstance(excinfo.value, BoundsMissedError | FileFormatError):
             return str(excinfo.value)
         return super().repr_failure(excinfo, *args)
 

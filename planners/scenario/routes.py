@@ -64,6 +64,7 @@ def held_to_truth(answer: Answer, simulated: Simulated, fine: ConfidenceGrid) ->
         "true_clearance": float(distances.min()) if len(distances) else None,
         "collisions": int((distances < radius).sum()),
         "optimum": optimum,
+        "ratio": None,
     }
     if isinstance(optimum, float) and optimum > 0:
         figures["ratio"] = float(shapely.length(line)) / optimum

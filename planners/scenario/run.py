@@ -144,11 +144,12 @@ def _missed(
 ) -> tuple[str, ...]:
     """Return a sentence for each bound that does not hold."""
     reasons = {f"{answer.query.name}.outcome": answer.reason for answer in answers}
+    routeless = tuple(f"{answer.query.name}." for answer in answers if answer.reason)
     sentences = []
     for name, bound in bounds.items():
         if bound.holds(figures.get(name)):
             continue
-        if name not in figures and name.count(".") == 0:
+        if name not in figures and not name.startswith(routeless):
             sentences.append(f"there is no figure {name}; there are {', '.join(figures)}")
             continue
         value, reason = figures.get(name), reasons.get(name, "")
