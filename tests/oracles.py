@@ -216,11 +216,12 @@ def counted_against(
     heights = [*flat.heights.tolist(), *flat.support_heights.tolist()]
     rows = Counter(flat.feature.tolist())
     against, which = np.zeros(len(surfaces.ends)), [set[int]() for _ in surfaces.ends]
-    for s, (first, last) in enumerate(surfaces.ends):
+    for s, (right, left) in enumerate(surfaces.ends):
+        first, last = right, left
         below = 0.0 if surfaces.kind[s] == SurfaceKind.DOUBTFUL else 0.05
         if surfaces.discs[s] > 0.02:
-            middle, share = 0.5 * (first + last), 0.02 / surfaces.discs[s]
-            first, last = (middle + share * (end - middle) for end in (first, last))
+            middle, share = 0.5 * (right + left), 0.02 / surfaces.discs[s]
+            first, last = (middle + share * (end - middle) for end in (right, left))
         if np.arctan2(*last[::-1]) - np.arctan2(*first[::-1]) < 1e-9:
             continue
         for (x, y), height, feature in zip(places, heights, flat.feature.tolist(), strict=True):
@@ -238,6 +239,43 @@ def counted_against(
                 against[s] += 1 / rows[feature]
                 which[s].add(feature)
     return against, which
+
+
+def places_without_ground(flat: FlatView, step: float) -> list[tuple[float, float]]:
+    """Places along the lines to features below the ground, from where they go below its level.
+
+    A line that is below it for more than 3 m has none, nor one with ground features beside it
+    there: within 0.15 m of it, and as much away from where it goes below and from its end.
+    """
+    places = []
+    for (x, y), height in zip(flat.drop_offs.tolist(), flat.drop_off_heights.tolist(), strict=True):
+        begin = flat.camera_height / (flat.camera_height - height)
+        length = np.hypot(x, y)
+        if (1 - begin) * length > 3.0:
+            continue
+        line = shapely.LineString([(0.0, 0.0), (x, y)])
+        tight = shapely.LineString(
+            [
+                (x * (begin + 0.15 / length), y * (begin + 0.15 / length)),
+                (x * (1 - 0.15 / length), y * (1 - 0.15 / length)),
+            ]
+        )
+        if (1 - begin) * length > 0.3 and any(
+            _foot_within(tight, line, shapely.Point(place)) for place in flat.supports.tolist()
+        ):
+            continue
+        count = int(np.ceil((1 - begin) * length / step))
+        shares = [begin + (1 - begin) * (number + 0.5) / count for number in range(count)]
+        places += [(share * x, share * y) for share in shares]
+    return places
+
+
+def _foot_within(piece: shapely.LineString, line: shapely.LineString, place: shapely.Point) -> bool:
+    """Whether a place is within 0.15 m beside a piece of a line, not before or behind it."""
+    if line.distance(place) >= 0.15:
+        return False
+    foot = line.interpolate(line.project(place))
+    return bool(piece.distance(foot) < 1e-9)
 
 
 def triangles_of(fan: SightFan) -> list[shapely.Polygon]:

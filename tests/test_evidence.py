@@ -299,6 +299,14 @@ def test_a_doubtful_link_is_not_drawn_and_hides_what_is_behind_it() -> None:
     assert said(by_hand(flat, doubt=1.0).evidence)[(0, 60)] == -1.0
 
 
+def test_what_may_go_on_beside_a_feature_is_not_drawn() -> None:
+    wide = said(by_hand(flat_view([(5.06, 0.06)], heights=0.4), halo=0.9).evidence)
+    none = said(by_hand(flat_view([(5.06, 0.06)], heights=0.4), halo=0.0).evidence)
+    nonfree = [{cell for cell, z in cells.items() if z > 0} for cells in (wide, none)]
+    assert nonfree[0] == nonfree[1]
+    assert len(nonfree[0]) > 0
+
+
 def test_nothing_seen_says_nothing() -> None:
     assert said(by_hand(flat_view()).evidence) == {}
 
@@ -317,3 +325,34 @@ def test_drop_offs_are_counted_once_per_cell() -> None:
     # Ahead is y of the map, left is -x.
     cells = drop_off_cells(flat, ConfidenceGrid(resolution=0.5))
     assert sorted(map(tuple, cells.tolist())) == [(2, -1), (6, 4)]
+
+
+def drop_offs(flat: FlatView, resolution: float = 0.5) -> list[Cell]:
+    cells = drop_off_cells(flat, ConfidenceGrid(resolution=resolution))
+    return [(row, col) for row, col in cells.tolist()]
+
+
+# A line of sight from 1 m up to a feature 1 m below the ground, 5.9 m ahead, enters the pit
+# at 2.95 m.
+PIT = flat_view(drop_offs=[(5.9, 0.1)], drop_off_heights=-1.0)
+
+
+def test_a_pit_is_counted_from_where_sight_enters_it() -> None:
+    assert drop_offs(PIT) == [(0, col) for col in range(6, 12)]
+    # Seen again beside, each cell is still counted once.
+    twice = flat_view(drop_offs=[(5.9, 0.1), (5.9, 0.12)], drop_off_heights=-1.0)
+    assert drop_offs(twice) == drop_offs(PIT)
+
+
+def test_a_pit_lies_where_the_view_stands() -> None:
+    moved = PIT._replace(viewpoint=np.array([10.0, 20.0]), forward=np.array([0.0, 1.0]))
+    assert drop_offs(moved) == [(40 + row, 19) for row in range(6, 12)]
+
+
+def test_a_false_match_across_ground_that_was_seen_is_counted_where_it_is_alone() -> None:
+    assert drop_offs(PIT._replace(supports=np.array([(4.0, 0.0)]))) == [(0, 11)]
+
+
+def test_a_line_below_the_ground_for_long_is_counted_at_its_end_alone() -> None:
+    for end, count in ((5.9, 6), (6.1, 1)):  # 2.95 m and 3.05 m of it are below
+        assert len(drop_offs(flat_view(drop_offs=[(end, 0.1)], drop_off_heights=-1.0))) == count

@@ -275,6 +275,34 @@ def test_a_camera_that_looks_at_the_ground_or_the_sky_is_refused(
         flatten(view, OPTIONS)
 
 
+@settings(max_examples=50)
+@given(views())
+def test_features_below_the_ground_keep_their_height(view: View) -> None:
+    view = replace(view, segments=Features.segments([], []))
+    assert view.plane is not None
+    flat = flatten(view, OPTIONS)
+    _, classes = point_classes(view)
+    T_base = view.rig.T_base_camera
+    base = view.points.xyz[classes["below_ground"]] @ T_base[:3, :3].T + T_base[:3, 3]
+    height = base @ view.plane.normal + view.plane.offset
+    np.testing.assert_allclose(flat.drop_off_heights, height, atol=1e-9)
+    assert (flat.drop_off_heights < 0).all()
+
+
+def test_a_segment_below_the_ground_counts_by_its_middle() -> None:
+    flat = clipped((5.0, -1.0, -1.0), (5.0, 2.0, -0.4))
+    np.testing.assert_allclose(flat.drop_offs, [(5.0, 0.5)])
+    np.testing.assert_allclose(flat.drop_off_heights, [-0.7])
+
+
+@pytest.mark.parametrize(("cx", "border"), [(640.0, 640.0 / 700.0), (0.0, np.inf), (-3.0, np.inf)])
+def test_the_images_borders_are_those_of_the_rig(cx: float, border: float) -> None:
+    view = level_view(points=[(5.0, 0.0, 0.5)])
+    flat = flatten(replace(view, rig=replace(view.rig, cx=cx)), OPTIONS)
+    assert flat.border == pytest.approx(border)
+    assert flat.baseline == view.rig.baseline
+
+
 def test_a_view_without_features_is_empty() -> None:
     flat = flatten(level_view(), OPTIONS)
     assert [len(part) for part in (flat.points, flat.supports, flat.drop_offs)] == [0, 0, 0]

@@ -13,13 +13,19 @@ from hypothesis import strategies as st
 from groundmap.arrays import Bools, Floats
 from groundmap.heights import FlatView
 from groundmap.kernels.lines import passed_through
-from groundmap.lines_of_sight import Contradictions, contradictions, support_chords
+from groundmap.lines_of_sight import (
+    Contradictions,
+    contradictions,
+    missing_ground,
+    support_chords,
+)
 from groundmap.settings import MapperSettings
 from groundmap.sight2d import NO_SURFACE, SightFan, visible_freespace
 from groundmap.surfaces import SurfaceKind, Surfaces, find_surfaces
 from groundmap.triangulation import triangulate
-from oracles import counted_against, farthest
+from oracles import counted_against, farthest, places_without_ground
 from oracles import gap_chords as all_chords
+from oracles import support_chords as single_chords
 from strategies import Cloud, flat_view, rngs, rooms
 
 SHARP = MapperSettings(uncertainty="none", halo=0.0)
@@ -179,6 +185,40 @@ def test_a_feature_within_twice_the_reach_is_on_the_surface(
     assert found.passes.tolist() == [bool(count)]
 
 
+@pytest.mark.parametrize(("below", "height", "count"), [(0.05, 0.94, 1), (0.05, 0.96, 0)])
+@pytest.mark.parametrize("margin", [True, False])
+def test_sight_that_passes_a_little_below_a_top_may_have_passed_over_it(
+    below: float, height: float, count: int, margin: bool
+) -> None:
+    # Half-way to a feature of height 2 h - 1, sight from 1 m up is at h; the top is 1 m.
+    found = passed(
+        [(4, -1), (4, 1)], [(8.0, 0.0)], [2 * height - 1], top=1.0, below=below if margin else 0.0
+    )
+    assert found.against.tolist() == [count if margin else 1.0]
+
+
+@pytest.mark.parametrize(("beside", "count"), [(0.0, 1), (0.018, 1), (-0.018, 1), (0.022, 0)])
+def test_only_what_is_seen_through_the_thinnest_pole_contradicts_a_lone_point(
+    beside: float, count: int
+) -> None:
+    flat = flat_view([(4.0, 0.0)], heights=1.5, supports=[(8.0, 2 * beside)])
+    assert doubts(flat).against.tolist() == [count]
+    assert SHARP.resolution / 2 > 0.022  # though its disc hides more
+
+
+@pytest.mark.parametrize(("height", "firm", "doubtful"), [(0.85, 1, 1), (0.95, 0, 1), (1.05, 0, 0)])
+def test_a_doubtful_surface_has_no_margin_below_its_top(
+    height: float, firm: int, doubtful: int
+) -> None:
+    flat = flat_view([(4.0, 0.0)], heights=1.0, supports=[(8.0, 0.01)], support_heights=height)
+    surfaces = surfaces_of(flat, MapperSettings(uncertainty="none"))
+    found = contradictions(flat, surfaces)
+    beside = surfaces.kind == SurfaceKind.DOUBTFUL
+    assert found.against[~beside].tolist() == [firm]
+    assert sorted(found.against[beside].tolist()) == [0, doubtful]  # the right half, the left one
+    assert found.features == firm
+
+
 # A hedge or a ghost 4 m ahead, a wall 8 m ahead; the camera is 1 m up.
 AHEAD = [(4.0, -1.0), (4.0, 1.0), (8.0, -3.0), (8.0, 3.0)]
 TWO_WALLS = [(0, 1), (2, 3)]
@@ -324,7 +364,59 @@ def test_a_doubtful_link_closes_what_nothing_is_seen_through(through: int, range
     assert sight(flat) == pytest.approx(range_)
 
 
+@pytest.mark.parametrize(("through", "range_"), [(0, 0.0), (1, 4.0), (2, 8.0)])
+def test_beside_a_feature_sight_ends_unless_more_is_seen_there(through: int, range_: float) -> None:
+    # Ground 8 m ahead is seen 0.12 m to the left of a pole 4 m ahead.
+    options = MapperSettings(uncertainty="none", sight_gap=0.0)
+    behind = [(8.0, 0.24), (8.0, 0.23)][:through]
+    flat = flat_view([(4.0, 0.0)], heights=1.5, supports=behind)
+    found = sight(flat, options, bearing=0.03)
+    assert found == pytest.approx(range_, abs=0.02)
+    if through:
+        without = MapperSettings(uncertainty="none", sight_gap=0.0, halo=0.0)
+        assert sight(flat, without, bearing=0.03) == pytest.approx(8.0, abs=0.02)
+
+
 # What is granted
+
+
+@settings(max_examples=100)
+@given(rngs(), st.floats(0.2, 2.0), st.floats(0.0, 1.0))
+def test_a_ground_feature_vouches_for_what_both_images_see(
+    rng: np.random.Generator, border: float, baseline: float
+) -> None:
+    options = MapperSettings(sight_gap=0.0)
+    supports = rng.uniform((0.4, -8.0), (9.0, 8.0), size=(20, 2))
+    flat = flat_view(supports=supports, border=border, baseline=baseline)
+    found = support_chords(flat, options)[:20]  # no gap lies between lines of sight
+    expected = single_chords(flat, options.support_width, options.support_angle)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+    for place, chord in zip(supports, found, strict=True):
+        for x, y in chord:
+            at_feature = np.hypot(x - place[0], y - place[1]) < 1e-9
+            in_both = y >= -border * x - 1e-9 and y + baseline <= border * x + 1e-9
+            # Of one end only that is beyond the border is the feature's own.
+            assert in_both or at_feature or chord_is_beyond(place, (x, y), border, baseline)
+
+
+def chord_is_beyond(
+    place: Floats, end: tuple[float, float], border: float, baseline: float
+) -> bool:
+    """Whether an end is on the inner side of a feature that is itself beyond a border."""
+    left = place[1] + baseline > border * place[0]
+    right = place[1] < -border * place[0]
+    turn = place[0] * end[1] - place[1] * end[0]
+    return bool((left and turn <= 1e-9) or (right and turn >= -1e-9))
+
+
+def test_at_an_images_border_a_ground_feature_vouches_inwards_only() -> None:
+    at_border = 0.5  # of 0.5 m per metre
+    for side, reach in ((1.0, (4.98, 0.0)), (-1.0, (4.98, 0.0))):
+        bearing = side * np.arctan(at_border)
+        place = 5.0 * np.array([np.cos(bearing), np.sin(bearing)])
+        flat = flat_view(supports=[place], border=at_border)
+        inner, outer = (sight(flat, bearing=bearing - side * off) for off in (0.02, -0.02))
+        assert (inner, outer) == pytest.approx(reach, abs=0.03)
 
 
 @settings(max_examples=100)
@@ -426,3 +518,60 @@ def test_a_lone_obstacle_grants_up_to_a_reach_before_it() -> None:
     options = MapperSettings(link_length=0.0, link_angle=0.0)
     radius = np.hypot(5.0, 0.35) - 2 * 0.2
     assert reaches(seen(flat, options)) == pytest.approx(radius * 5.0 / np.hypot(5.0, 0.35))
+
+
+# Where the ground is missing
+
+
+@settings(max_examples=200)
+@given(rngs(), st.sampled_from([0.05, 0.25]))
+def test_ground_is_missing_where_lines_of_sight_run_below_its_level(
+    rng: np.random.Generator, step: float
+) -> None:
+    count = int(rng.integers(0, 8))
+    flat = flat_view(
+        drop_offs=rng.uniform((1.0, -5.0), (12.0, 5.0), size=(count, 2)),
+        drop_off_heights=-rng.uniform(0.05, 2.0, size=count),
+        supports=rng.uniform((1.0, -5.0), (12.0, 5.0), size=(rng.integers(0, 40), 2)),
+        camera_height=float(rng.uniform(0.5, 2.0)),
+    )
+    found = missing_ground(flat, step)
+    expected = np.array(places_without_ground(flat, step)).reshape(-1, 2)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+@settings(max_examples=100)
+@given(rngs())
+def test_where_the_ground_is_missing_sight_is_below_it_and_not_beyond_the_feature(
+    rng: np.random.Generator,
+) -> None:
+    height = -float(rng.uniform(0.1, 0.6))
+    place = rng.uniform((1.0, -2.0), (5.0, 2.0))
+    flat = flat_view(drop_offs=[place], drop_off_heights=height)
+    share = missing_ground(flat, 0.1) @ place / (place @ place)
+    sight_height = 1.0 + share * (height - 1.0)
+    assert ((sight_height < 0.0) & (sight_height > height)).all()
+    assert np.diff(share).max(initial=0.0) * np.hypot(*place) <= 0.1 + 1e-9
+    # The first and the last place are within half a step of the ends.
+    assert share[0] * np.hypot(*place) <= np.hypot(*place) / (1.0 - height) + 0.05 + 1e-9
+    assert share[-1] * np.hypot(*place) >= np.hypot(*place) - 0.05 - 1e-9
+
+
+@pytest.mark.parametrize(
+    ("ground", "missing"),
+    [
+        ((4.0, 0.14), False),  # beside the line
+        ((4.0, -0.14), False),
+        ((4.0, 0.16), True),  # too far from it
+        ((2.6, 0.0), True),  # before the line goes below the ground, at 2.5 m
+        ((2.7, 0.0), False),
+        ((4.8, 0.0), False),
+        ((4.9, 0.0), True),  # at the feature, 5 m ahead
+        ((5.5, 0.0), True),
+    ],
+)
+def test_ground_beside_a_line_below_it_tells_of_a_false_match(
+    ground: tuple[float, float], missing: bool
+) -> None:
+    flat = flat_view(drop_offs=[(5.0, 0.0)], supports=[ground])
+    assert len(missing_ground(flat, 0.1)) == (25 if missing else 0)

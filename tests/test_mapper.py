@@ -386,8 +386,9 @@ def test_drop_offs_are_counted_once_per_view_and_never_free() -> None:
     view = view_of(hole, np.empty((0, 2, 3)))
     mapper = mapped([view] * 3, resolution=0.5)
     assert mapper.stats.features_dropped == {"below_ground": 6}
-    window = mapper.grid.window((2.5, -0.5, 3.5, 0.5))
-    assert window.drop_offs.tolist() == [[0, 0], [0, 3]]
+    # From 1.5 m up, their lines of sight are below the ground's level from 1.86 m on.
+    window = mapper.grid.window((1.0, -0.5, 3.5, 0.5))
+    assert window.drop_offs.tolist() == [[0, 0, 0, 0, 0], [0, 3, 3, 3, 3]]
     assert not window.count.any()
     npt.assert_array_equal(window.states() == CellState.NONFREE, window.drop_offs == 3)
 

@@ -121,12 +121,12 @@ def test_an_unknown_key_names_the_nearest(key: str, nearest: str) -> None:
     with pytest.raises(
         SettingsError, match=rf"^{key}: expected a setting of SolidSettings.* '{nearest}'\?$"
     ):
-        SolidSettings(**{key: 1.0})
+        SolidSettings(**dict[str, Any]({key: 1.0}))
 
 
 def test_an_unknown_key_of_a_hole_names_the_nearest() -> None:
     with pytest.raises(SettingsError, match=r"^dept: expected a setting of HoleS.* 'depth'\?$"):
-        HoleSettings(box=BOX, dept=1.0)
+        HoleSettings(**dict[str, Any](box=BOX, dept=1.0))
 
 
 @pytest.mark.parametrize(
@@ -141,9 +141,9 @@ def test_an_unknown_key_of_a_hole_names_the_nearest() -> None:
 )
 @pytest.mark.parametrize("way", ["box", "table"])
 def test_a_solid_is_there_from_when_it_appears_until_it_vanishes(
-    way: str, told: dict[str, float], there: tuple[float, float]
+    way: str, told: dict[str, Any], there: tuple[float, float]
 ) -> None:
-    for solid in SolidSettings(**{way: BOX}, **told).solids():
+    for solid in SolidSettings(**{way: WAYS["table"], **told}).solids():
         assert solid.present == there
         for time in (0.0, 1.9, 2.0, 4.9, 5.0):
             assert solid.is_there(time) is (there[0] <= time < there[1])
@@ -173,7 +173,7 @@ def test_what_a_solid_is_like_reaches_every_piece_of_it(way: str) -> None:
 )
 def test_a_value_out_of_its_range_is_refused(key: str, value: float) -> None:
     with pytest.raises(SettingsError, match=rf"^{key}: expected greater than .*, got {value}\.$"):
-        SolidSettings(box=BOX, **{key: value})
+        SolidSettings(box=BOX, **dict[str, Any]({key: value}))
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -13,73 +14,69 @@ from test_scenario_command import FAILS, PASSES, SKIPPED
 from test_scenario_run import write
 
 
-def run_pytest(folder: Path, *options: str) -> tuple[int, str]:
-    """Run pytest with the plugin, as a user would; return exit code and output."""
+class Report(NamedTuple):
+    """How pytest ended: its failures, told one by one, and all else that it says."""
+
+    code: int
+    folder: Path
+    failures: str
+    rest: str
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Report:
+    """Two scenarios that fail, one that passes, one that is skipped, and a file that is none."""
+    folder = tmp_path_factory.mktemp("cases")
+    (folder / "pytest.ini").write_text("[pytest]\n")
+    write(folder / "bad", SKIPPED + "[maper]\n")
+    write(folder / "clear", PASSES)
+    write(folder / "deep" / "strict", FAILS)
+    write(folder / "gone", SKIPPED)
+    (folder / "clear" / "other.toml").write_text("not = 'a scenario'")
     done = subprocess.run(
         [
             *(sys.executable, "-m", "pytest", "-p", "planners.scenario.pytest_plugin"),
-            *("-p", "no:cacheprovider", "--color=no", "-rs", *options, str(folder)),
+            *("-p", "no:cacheprovider", "--color=no", "-v", "-rs", str(folder)),
         ],
         capture_output=True,
         text=True,
         check=False,
         cwd=folder,
     )
-    return done.returncode, done.stdout + done.stderr
+    assert done.stderr == ""
+    head, _, failures = done.stdout.partition("= FAILURES =")
+    failures, _, tail = failures.partition("= short test summary info =")
+    return Report(done.returncode, folder, failures, head + tail)
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    """Four scenarios, one of them no scenario, and a file that is none."""
-    (tmp_path / "pytest.ini").write_text("[pytest]\n")
-    write(tmp_path / "clear", PASSES)
-    write(tmp_path / "deep" / "strict", FAILS)
-    write(tmp_path / "gone", SKIPPED)
-    (tmp_path / "clear" / "other.toml").write_text("not = 'a scenario'")
-    return tmp_path
-
-
-def test_there_is_one_test_for_each_scenario_called_by_its_name(folder: Path) -> None:
-    code, out = run_pytest(folder, "--collect-only", "-q")
-    assert code == 0
-    assert [line for line in out.splitlines() if "::" in line] == [
-        "clear/scenario.toml::clear",
-        "deep/strict/scenario.toml::strict",
-        "gone/scenario.toml::gone",
+def test_there_is_one_test_for_each_scenario_called_by_its_name(report: Report) -> None:
+    lines = [line.split()[:2] for line in report.rest.splitlines() if "::" in line]
+    assert lines == [
+        ["bad/scenario.toml::bad", "FAILED"],
+        ["clear/scenario.toml::clear", "PASSED"],
+        ["deep/strict/scenario.toml::strict", "FAILED"],
+        ["gone/scenario.toml::gone", "SKIPPED"],
     ]
+    assert report.code == 1
+    assert "2 failed, 1 passed, 1 skipped" in report.rest
 
 
-def test_scenarios_pass_fail_and_are_skipped(folder: Path) -> None:
-    code, out = run_pytest(folder, "-v")
-    assert code == 1
-    assert "clear/scenario.toml::clear PASSED" in out
-    assert "deep/strict/scenario.toml::strict FAILED" in out
-    assert "gone/scenario.toml::gone SKIPPED" in out
-    assert f"there is no log {folder / 'gone' / 'no-log'}" in out
-    assert "1 failed, 1 passed, 1 skipped" in out
-    # What failed says why it exists and which bound it missed, and nothing of how that was found.
-    assert re.search(r"\nstrict: A tiny hall.*\nfree_recall is 0\.\d+, not ≥ 2\n", out)
-    assert "unknown is" not in out
-    assert_no_traceback(out)
+def test_what_failed_says_why_it_exists_and_which_bounds_it_missed(report: Report) -> None:
+    told = r"\nstrict: A tiny hall with a box\.\nfree_recall is 0\.\d+, not ≥ 2\n"
+    assert re.search(told, report.failures)
+    assert "unknown is" not in report.failures  # a bound that holds
 
 
-def test_a_scenario_is_chosen_by_its_name(folder: Path) -> None:
-    code, out = run_pytest(folder, "-k", "clear")
-    assert code == 0
-    assert "1 passed, 2 deselected" in out
+def test_a_file_that_is_no_scenario_fails_with_a_sentence(report: Report) -> None:
+    path = report.folder / "bad" / "scenario.toml"
+    assert f"\n{path}: expected maper to be a setting" in report.failures
+    assert "Did you mean 'mapper'?" in report.failures
 
 
-def test_a_file_that_is_no_scenario_fails_with_a_sentence(tmp_path: Path) -> None:
-    (tmp_path / "pytest.ini").write_text("[pytest]\n")
-    path = write(tmp_path / "bad", SKIPPED + "[maper]\n")
-    code, out = run_pytest(tmp_path)
-    assert code == 1
-    assert f"{path}: expected maper to be a setting" in out
-    assert "Did you mean 'mapper'?" in out
-    assert_no_traceback(out)
+def test_there_is_no_traceback(report: Report) -> None:
+    for word in ("Traceback", ".py:", "raise ", "\nE "):
+        assert word not in report.failures
 
 
-def assert_no_traceback(out: str) -> None:
-    assert "Traceback" not in out
-    assert ".py:" not in out
-    assert "raise " not in out
+def test_a_scenario_with_a_missing_log_is_skipped(report: Report) -> None:
+    assert f"there is no log {report.folder / 'gone' / 'no-log'}" in report.rest

@@ -152,7 +152,7 @@ def test_an_error_that_is_not_expected_fails_with_its_reason(tmp_path: Path) -> 
     outcome = run_scenario(write(tmp_path, text))
     assert outcome.passed is False
     assert outcome.missed[0].startswith("closed.outcome is EnclosedError, not = route (")
-    assert "(5.00, 2.00)" in outcome.missed[0]
+    assert "fenced in" in outcome.missed[0]
     assert outcome.missed[1:] == ("closed.collisions is None, not ≤ 0",)
 
 
@@ -255,7 +255,7 @@ def test_a_log_is_judged_by_what_was_held_out_of_it(tmp_path: Path) -> None:
     ) + query(start=(0, 0), goal=(2, 0), footprint=0.2, more='expect = "OutsideMapError"')
     outcome = run_scenario(write(tmp_path / "drive", text))
     about = {name.partition(".")[0] for name in outcome.figures}
-    assert about == {"views", "ids", "thin", "along"}
+    assert about == {"views", "ids", "thin", "stamping", "along"}
     assert 0.5 < number(outcome, "views.ground_free") <= 1.0
     assert outcome.picture.startswith(b"\x89PNG")
     assert "along.collisions" not in outcome.bounds  # nobody knows what the route would touch

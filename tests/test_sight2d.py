@@ -205,9 +205,7 @@ def test_walls_all_around_leave_no_gap_at_the_seam(
 
 @settings(max_examples=100)
 @given(rooms(), st.floats(-np.pi, np.pi))
-def test_where_the_seam_lies_changes_nothing(
-    room: Cloud, yaw: float
-) -> None:
+def test_where_the_seam_lies_changes_nothing(room: Cloud, yaw: float) -> None:
     # Lines of sight know no neighbour beyond the seam, and images none behind the camera.
     here = low_view(room.points, room.segments)
     assert turned_area(here, yaw, UNBRIDGED) == pytest.approx(turned_area(here, 0.0, UNBRIDGED))
@@ -265,6 +263,17 @@ def test_a_disc_hides_what_is_behind_it() -> None:
     cell = EXACT.resolution
     assert fan.area == pytest.approx(24.0 - (6.0**2 - 2.0**2) / 2.0 * (cell / 2.0))
     assert sorted(surfaces.kind[fan.surface].tolist()) == [0, 0, 2]
+
+
+@settings(max_examples=60)
+@given(rngs())
+def test_a_low_lone_point_grants_all_that_is_before_its_disc(rng: np.random.Generator) -> None:
+    place = rng.uniform((1.0, -4.0), (9.0, 4.0))
+    fan, surfaces = seen(flat_view([place], heights=0.3), SHARP)
+    # Beside it is what is doubtful, which grants nothing.
+    half = np.arctan2(SHARP.resolution / 2.0, np.hypot(*place))
+    assert np.diff(fan.bearings).sum() == pytest.approx(2 * half)
+    assert (surfaces.kind[fan.surface] == SurfaceKind.LONE).all()
 
 
 def test_an_edge_seen_end_on_counts_by_its_nearer_end() -> None:
@@ -335,6 +344,8 @@ def test_freespace_is_never_behind_a_surface_that_hides(
     assume(len(surfaces.ends) > 0)
     # In a triangle narrower than rounding, all places are right at the end of some surface.
     free = fan.free[np.diff(fan.bearings)[:, 0] > 1e-9]
+    # So they are in one of which a whole side lies within the surface's reach.
+    free = free[np.hypot(free[..., 0], free[..., 1]).min(axis=1, initial=np.inf) > 1e-6]
     share = rng.uniform(size=(len(free), 5, 1))
     places = free[:, None, 0] * (1.0 - share) + free[:, None, 1] * share
     places = places.reshape(-1, 2)

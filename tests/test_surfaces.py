@@ -304,6 +304,61 @@ def test_a_short_segment_beside_a_crossing_does_no_harm() -> None:
     assert np.isfinite(surfaces.tops).all()
 
 
+# What a feature is on may go on beside it
+
+
+def doubtful_beside(flat: FlatView, halo: float) -> list[tuple[Floats, float]]:
+    """Half chords across the line of sight beside each feature, and how high they are."""
+    found = []
+    for place, height in zip(flat.points, flat.heights.tolist(), strict=True):
+        across = np.array([-place[1], place[0]]) / np.hypot(*place)
+        if np.hypot(*place) >= 0.3 and halo > 0:
+            found += [(np.stack([place - halo * across, place]), height)]
+            found += [(np.stack([place, place + halo * across]), height)]
+    return found
+
+
+@settings(max_examples=60)
+@given(rngs(), st.sampled_from([0.0, 0.15, 0.6]))
+def test_beside_each_feature_half_chords_across_the_line_of_sight_are_doubtful(
+    rng: np.random.Generator, halo: float
+) -> None:
+    points = rng.uniform((-0.5, -4.0), (9.0, 4.0), size=(rng.integers(1, 20), 2))
+    flat = flat_view(
+        points,
+        heights=rng.uniform(0.2, 1.5, size=len(points)),
+        covariance=rng.uniform(0.0, 0.3, size=len(points)) ** 2,
+    )
+    surfaces = surfaces_of(flat, MapperSettings(halo=halo, doubt=1.0, link_height=99.0))
+    doubtful = surfaces.kind == SurfaceKind.DOUBTFUL
+    expected = doubtful_beside(flat, halo)
+    assert doubtful.sum() == len(expected)
+    for pair, height in expected:
+        off = np.abs(surfaces.ends[doubtful] - pair).max(axis=(1, 2))
+        row = np.flatnonzero(doubtful)[off.argmin()]
+        assert off.min() < 1e-4
+        assert surfaces.tops[row].tolist() == surfaces.bottoms[row].tolist() == [height, height]
+        assert surfaces.discs[row] == 0.0
+
+
+@settings(max_examples=60)
+@given(rooms(), st.floats(0.01, 1.0))
+def test_what_is_beside_features_changes_nothing_but_adds_to_what_is_doubtful(
+    room: Cloud, halo: float
+) -> None:
+    flat = flat_view(room.points, room.segments)
+    plain = surfaces_of(flat)
+    haloed = surfaces_of(flat, MapperSettings(halo=halo))
+    for kind in SurfaceKind:
+        if kind != SurfaceKind.DOUBTFUL:
+            np.testing.assert_array_equal(of_kind(haloed, kind), of_kind(plain, kind))
+    np.testing.assert_array_equal(haloed.frontiers, plain.frontiers)
+    assert haloed.through_viewpoint == plain.through_viewpoint
+    assert pairs(of_kind(plain, SurfaceKind.DOUBTFUL)) <= pairs(
+        of_kind(haloed, SurfaceKind.DOUBTFUL)
+    )
+
+
 def test_no_features_have_no_surfaces() -> None:
     surfaces = surfaces_of(flat_view())
     assert len(surfaces.ends) == len(surfaces.kind) == len(surfaces.frontiers) == 0

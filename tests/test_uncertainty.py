@@ -120,7 +120,8 @@ def test_a_ray_through_the_spread_adds_up_to_one_cell_at_most(
 
 
 @pytest.mark.parametrize(
-    ("sigma", "on_surface"), [(0.0, 1.0), (0.5, 1.0), (1.0, 1.0), (1.02, 0.980), (2.0, 0.5), (4.0, 0.25)]
+    ("sigma", "on_surface"),
+    [(0.0, 1.0), (0.5, 1.0), (1.0, 1.0), (1.02, 0.980), (2.0, 0.5), (4.0, 0.25)],
 )
 def test_a_surface_is_sure_up_to_a_standard_deviation_of_one_cell(
     sigma: float, on_surface: float

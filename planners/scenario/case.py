@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 from pydantic import Field
 
@@ -17,10 +17,21 @@ from groundmap.simulate.parts import HoleSettings, SolidSettings
 from groundmap.simulate.scan import ScanSettings
 from groundmap.simulate.sensor import SensorSettings
 from groundmap.simulate.worlds import GENERATORS, WorldGenerator
+from planners.registry import PLANNERS
 from planners.scenario.outcome import Bound
 
 FILE = "scenario.toml"
 S = TypeVar("S", bound=Settings)
+
+
+Expected = Literal[
+    "route",
+    "OutsideMapError",
+    "NonFreeError",
+    "UnknownSpaceError",
+    "EnclosedError",
+    "TimeLimitError",
+]
 
 
 class QuerySettings(Settings):
@@ -33,7 +44,7 @@ class QuerySettings(Settings):
     robot_radius: float | None = Field(
         None, ge=0, description="what must not touch the true world; the footprint unless told [m]"
     )
-    expect: str = Field("route", description="'route', or the name of the error: EnclosedError")
+    expect: Expected = Field("route", description="'route', or the name of the error")
     planner: str = Field("astar", description="name of the planner")
     max_ratio: float | None = Field(
         None, ge=1, description="of the route's length to that of the best in the true world"
@@ -155,6 +166,10 @@ def _scenario(path: Path, content: dict[str, Any]) -> Scenario:
     for hole in holes:
         hole.hole()
     queries = tuple(QuerySettings(**table) for table in head.queries)
+    for query in queries:
+        if query.planner not in PLANNERS:
+            known = ", ".join(sorted(PLANNERS))
+            raise InputError("queries.planner", f"one of {known}", repr(query.planner))
     names = [query.name for query in queries]
     if len(set(names)) < len(names):
         raise InputError("queries", "a name of its own for each", ", ".join(names))

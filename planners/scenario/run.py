@@ -147,7 +147,11 @@ def _missed(
     routeless = tuple(f"{answer.query.name}." for answer in answers if answer.reason)
     sentences = []
     for name, bound in bounds.items():
-        if bound.holds(figures.get(name)):
+        query, _, figure = name.rpartition(".")
+        outcome = bounds.get(f"{query}.outcome")
+        unexpected = outcome is not None and not outcome.holds(figures.get(f"{query}.outcome"))
+        # Where the outcome is not what was expected, that says it all.
+        if bound.holds(figures.get(name)) or (unexpected and figure != "outcome"):
             continue
         if name not in figures and not name.startswith(routeless):
             sentences.append(f"there is no figure {name}; there are {', '.join(figures)}")

@@ -49,7 +49,10 @@ missing = 0.1                # share of the features in sight that are not match
 false_matches = 0.02         # share that is matched with any disparity
 
 [drive]
-stops = [[1, 1, 0], [8.5, 1, 0], [8.5, 4.8, 90], [1.5, 4.8, 180]]   # x, y, heading [deg]
+stops = [                    # x, y, heading [deg]
+    [1, 1, 0], [8.5, 1, 0], [8.5, 1, 90], [8.5, 4.8, 90], [8.5, 4.8, 180],
+    [1.5, 4.8, 180], [1.5, 4.8, 270], [1.5, 1.5, 270],
+]
 every = 0.5                  # a view at least this often
 
 [mapper]                     # as in the settings file of `groundmap map`
@@ -57,7 +60,7 @@ resolution = 0.1524
 
 [[queries]]                  # routes to ask for
 name = "around"
-start = [1, 1]
+start = [1.5, 1.2]
 goal = [8, 4.5]
 footprint = 0.3              # radius to plan with
 robot_radius = 0.25          # what must not touch the true world
