@@ -16,6 +16,7 @@ from groundmap.uncertainty import MODELS
 
 RADIAL = 1e-9  # [rad], an edge that spans less is seen end-on
 FRONTIER = 255  # the kind of an edge that is no surface
+JUST_BEHIND = 1e-6  # of its range: how far a doubtful place lies behind what makes it so
 SHARE_OF_FOOTPRINT = 0.8  # a link shorter than this share of the narrowest robot stops that robot
 
 
@@ -189,13 +190,16 @@ def _away_from_viewpoint(
 
 
 def _beside(vertices: _Vertices, which: Bools, settings: MapperSettings) -> _Vertices:
-    """Return where what a feature is on may go on: to both sides, across the line of sight."""
+    """Return where what a feature is on may go on: to both sides, across the line of sight.
+
+    Just behind the feature: the disc of a lone point lies there too, and is to be in front.
+    """
     some = _Vertices(*(values[which] for values in vertices))
     half = np.full(len(some.xy), settings.halo)
     left, right = np.moveaxis(_silhouettes(some.xy, half), 1, 0)
     halves = np.concatenate([np.stack([left, some.xy], axis=1), np.stack([some.xy, right], axis=1)])
     others = (np.concatenate([_twice(values)] * 2) for values in some[1:])
-    return _Vertices(halves, *others)
+    return _Vertices((1.0 + JUST_BEHIND) * halves, *others)
 
 
 def _discs(vertices: _Vertices, lone: Bools, ends: _Vertices) -> _Vertices:
