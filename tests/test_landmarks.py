@@ -8,6 +8,7 @@ import shapely
 from hypothesis import given, settings
 
 from groundmap.arrays import Floats
+from groundmap.errors import InputError
 from groundmap.simulate.landmarks import GROUND, LONGEST, OFF, Marks, present_at, strew
 from groundmap.simulate.shapes import pole, table, wall
 from groundmap.simulate.world import Hole, Solid, World
@@ -194,3 +195,13 @@ def test_landmarks_move_and_come_and_go_with_their_owner() -> None:
             np.testing.assert_allclose(
                 shift, np.broadcast_to((0.5 * time, 0.25 * time, 0.0), shift.shape), atol=1e-12
             )
+
+
+def test_a_world_of_more_landmarks_than_memory_is_refused() -> None:
+    box = Solid(shapely.box(4, 4, 5, 5), top=1.0, texture=4e6)
+    for world in (
+        World(bounds=(0, 0, 1e5, 6e4), ground_texture=12.0),
+        World(bounds=(0, 0, 10, 10), solids=(box,)),
+    ):
+        with pytest.raises(InputError, match=r"^world: expected 1e\+07 landmarks at most, got"):
+            strew(world, np.random.default_rng(1))

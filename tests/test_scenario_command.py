@@ -189,3 +189,11 @@ def test_the_file_to_start_with_gives_the_units(tmp_path: Path) -> None:
     text = (tmp_path / "mine" / "scenario.toml").read_text(encoding="utf-8")
     for unit in ("Metres, radians", "seconds", "[1/m²]", "[px]", "[deg]"):
         assert unit in text
+
+
+@pytest.mark.parametrize("name", ["../up", "a/b", "..", ""])
+def test_a_new_scenario_stays_in_its_folder(tmp_path: Path, name: str) -> None:
+    refused = run("scenario", "new", name, "--folder", tmp_path / "cases")
+    assert refused.code == 2
+    assert refused.err == f"groundmap: name: expected the name of one folder, got {name!r}.\n"
+    assert list(tmp_path.iterdir()) == []

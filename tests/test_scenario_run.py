@@ -327,3 +327,14 @@ def test_a_bound_holds_what_keeps_to_it_and_nothing_that_is_missing(
 def test_a_bound_reads_as_people_write_it() -> None:
     bounds = Bound(min=0.97), Bound(max=0), Bound(min=1, max=2.5), Bound(equals="route")
     assert [str(bound) for bound in bounds] == ["≥ 0.97", "≤ 0", "≥ 1 and ≤ 2.5", "= route"]
+
+
+def test_a_world_of_too_many_cells_fails_with_what_to_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("planners.scenario.simulated.MOST_CELLS", 100.0)
+    outcome = run_scenario(write(tmp_path, HALL))
+    assert outcome.passed is False
+    (missed,) = outcome.missed
+    assert missed.startswith("InputError: world: expected 100 cells at most, got ")
+    assert missed.endswith("Give smaller bounds [m], or a coarser resolution [m].")

@@ -9,11 +9,13 @@ import numpy as np
 import shapely
 
 from groundmap.arrays import Bools, Floats, Ints
+from groundmap.errors import InputError
 from groundmap.simulate.occlusion import edges_of
 from groundmap.simulate.world import Hole, Solid, World
 
 GROUND = -1  # the owner of what belongs to no solid
 OFF = 1e-6  # [m], landmarks stand off their surface, so that it doesn't hide them
+MOST = 1e7  # landmarks of a world: more is a size or a density in the wrong unit
 SHORTEST, LONGEST = 0.3, 1.2  # [m], of a segment
 
 
@@ -58,6 +60,11 @@ def strew(world: World, rng: np.random.Generator) -> Landmarks:
         The moving and the passing are strewn, too: `present_at` tells who is there.
     rng : numpy Generator
 
+    Raises
+    ------
+    InputError
+        More than ten million landmarks.
+
     Examples
     --------
     >>> world = World(bounds=(0, 0, 10, 10), solids=(Solid(shapely.box(4, 4, 5, 5), top=1.0),))
@@ -65,11 +72,27 @@ def strew(world: World, rng: np.random.Generator) -> Landmarks:
     >>> len(found.points), len(found.segments)
     (641, 8)
     """
+    _check_number(world)
     points, segments = [_on_ground(world, rng)], [_lines_on_ground(world, rng)]
     for solid in world.solids:
         points.append(np.concatenate([_on_faces(solid, rng), _on_top(solid, rng)]))
         segments.append(np.concatenate([_lines_on_faces(solid, rng), _edges(solid)]))
     return Landmarks(_marks(points), _marks(segments))
+
+
+def _check_number(world: World) -> None:
+    count = (world.ground_texture + world.ground_lines) * _ground_area(world)
+    for solid in world.solids:
+        sides = solid.outline.length * (solid.top - solid.bottom)
+        count += (solid.texture + 2.0 * solid.lines) * sides + solid.texture * solid.outline.area
+        count += solid.outline.length / LONGEST if solid.edges else 0.0
+    if count > MOST:
+        raise InputError(
+            "world",
+            f"{MOST:g} landmarks at most",
+            f"{count:.3g}",
+            hint="Give smaller bounds [m], or less texture [1/m²].",
+        )
 
 
 def _marks(parts: list[Floats]) -> Marks:

@@ -80,7 +80,7 @@ def new_command(
     as_json: JsonOption = False,
 ) -> None:
     """Start a scenario: writes a commented FOLDER/NAME/scenario.toml that runs as it is."""
-    path = write_template(folder / name, sorted(GENERATORS))
+    path = write_template(folder, name, sorted(GENERATORS))
     emit({"scenario": str(path)}, as_json=as_json, title=f"edit {path}, then run it")
 
 

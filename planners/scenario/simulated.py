@@ -10,10 +10,13 @@ import numpy as np
 
 from groundmap import ConfidenceGrid, GridWindow, GroundMapper, View, fit_ground
 from groundmap.draw import known_bounds
+from groundmap.errors import InputError
 from groundmap.simulate import Drive, World, drive, observe, strew
 from groundmap.simulate.scan import scan
 from groundmap.simulate.truth import Truth, truth_of
 from planners.scenario.case import Scenario
+
+MOST_CELLS = 4e6  # of a world that is compared cell by cell
 
 
 class Simulated(NamedTuple):
@@ -35,7 +38,7 @@ def simulate(scenario: Scenario) -> Simulated:
     views = views_of(scenario, world, moves)
     for view in fit_ground(views, camera_height=height, **scenario.ground.model_dump()):
         mapper.integrate(view)
-    window = mapper.grid.window(_bounds(world, mapper.grid))
+    window = _window(world, mapper.grid)
     truth = truth_of(world, moves, scenario.sensor, window, scenario.mapper)
     return Simulated(world, mapper.grid, window, truth)
 
@@ -57,9 +60,17 @@ def views_of(scenario: Scenario, world: World, moves: Drive) -> Iterable[View]:
     return observe(world, landmarks, moves, scenario.sensor, seed=scenario.seed)
 
 
-def _bounds(world: World, grid: ConfidenceGrid) -> tuple[float, ...]:
-    """Return the box around the world and all that the map speaks of."""
+def _window(world: World, grid: ConfidenceGrid) -> GridWindow:
+    """Return the map's window around the world and all that the map speaks of."""
     known = known_bounds(grid)
     low = np.minimum(world.bounds[:2], known[:2])
     high = np.maximum(world.bounds[2:], known[2:])
-    return tuple(np.concatenate([low, high]).tolist())
+    cells = float(np.prod((high - low) / grid.resolution))
+    if cells > MOST_CELLS:
+        raise InputError(
+            "world",
+            f"{MOST_CELLS:g} cells at most",
+            f"{cells:.3g}",
+            hint="Give smaller bounds [m], or a coarser resolution [m].",
+        )
+    return grid.window(np.concatenate([low, high]))

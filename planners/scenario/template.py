@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from groundmap.archive import write_atomically
-from groundmap.errors import FileFormatError
+from groundmap.errors import FileFormatError, InputError
 from planners.scenario.case import FILE
 
 TEMPLATE = '''\
@@ -73,14 +73,19 @@ false_free_beyond = {{ max = 0.01 }}
 '''
 
 
-def write_template(folder: Path, kinds: list[str]) -> Path:
-    """Write a commented scenario into a new folder, and return its file.
+def write_template(place: Path, name: str, kinds: list[str]) -> Path:
+    """Write a commented scenario into a new folder of a place, and return its file.
 
     Raises
     ------
     FileFormatError
         There is a scenario already.
+    InputError
+        A name that is no single folder's.
     """
+    folder = place / name
+    if folder.name != name or name in ("", ".", ".."):
+        raise InputError("name", "the name of one folder", repr(name))
     path = folder / FILE
     if path.exists():
         raise FileFormatError(path, "no scenario there yet", "one", hint="Give another name.")
