@@ -48,41 +48,41 @@ def contradictions(flat: FlatView, surfaces: Surfaces) -> Contradictions:
     passes below its top contradicts it. A surface that more features contradict than make it up
     is most likely the ghost of a false match.
     """
-    firm = surfaces.kind != SurfaceKind.DOUBTFUL
-    against = np.zeros(len(firm))
-    against[firm], features = _seen_through(flat, surfaces, firm, BELOW)
-    against[~firm], _ = _seen_through(flat, surfaces, ~firm, 0.0)
-    made_of = np.array([MADE_OF[kind] for kind in SurfaceKind])[surfaces.kind]
-    belief = np.where(against > made_of, made_of / (made_of + against), 1.0)
-    return Contradictions(against, belief, features)
-
-
-def _seen_through(
-    flat: FlatView, surfaces: Surfaces, which: Bools, below: float
-) -> tuple[Floats, int]:
-    """Return how many features are seen through each of some surfaces, and through any of them."""
     points = np.concatenate([flat.points, flat.supports])
     heights = np.concatenate([flat.heights, flat.support_heights])
     bearings = np.arctan2(points[:, 1], points[:, 0])
     order = np.argsort(bearings, kind="stable")
     feature = flat.feature[order]
     _, number, rows = np.unique(feature, return_inverse=True, return_counts=True)
-    against, passes = np.zeros(int(which.sum())), np.zeros(len(order), dtype=np.bool_)
-    passed_through(
-        _solid_ends(surfaces)[which],
-        surfaces.reach[which],
-        surfaces.tops[which],
-        bearings[order],
-        points[order],
-        heights[order],
-        1.0 / rows[number],  # the ends of a segment are one feature
-        flat.camera_height,
-        BEHIND,
-        below,
-        against,
-        passes,
-    )
-    return against, len(np.unique(feature[passes]))
+    shares = 1.0 / rows[number]  # the ends of a segment are one feature
+    bearings, points, heights = bearings[order], points[order], heights[order]
+    ends = _solid_ends(surfaces)
+
+    def count(which: Bools, below: float) -> tuple[Floats, Bools]:
+        against, passes = np.zeros(int(which.sum())), np.zeros(len(order), dtype=np.bool_)
+        passed_through(
+            ends[which],
+            surfaces.reach[which],
+            surfaces.tops[which],
+            bearings,
+            points,
+            heights,
+            shares,
+            flat.camera_height,
+            BEHIND,
+            below,
+            against,
+            passes,
+        )
+        return against, passes
+
+    firm = surfaces.kind != SurfaceKind.DOUBTFUL
+    against = np.zeros(len(firm))
+    against[firm], passes = count(firm, BELOW)
+    against[~firm], _ = count(~firm, 0.0)
+    made_of = np.array([MADE_OF[kind] for kind in SurfaceKind])[surfaces.kind]
+    belief = np.where(against > made_of, made_of / (made_of + against), 1.0)
+    return Contradictions(against, belief, len(np.unique(feature[passes])))
 
 
 def _solid_ends(surfaces: Surfaces) -> Floats:
