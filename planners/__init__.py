@@ -1,6 +1,7 @@
 """From A to B on a confidence grid: routes, or reasons why there is none."""
 
-from planners.astar import AStarSettings
+from planners.astar import AStarSettings, DijkstraSettings, WeightedAStarSettings
+from planners.costs import CostSettings
 from planners.errors import (
     AuditError,
     EnclosedError,
@@ -12,6 +13,7 @@ from planners.errors import (
     TimeLimitError,
     UnknownSpaceError,
 )
+from planners.footprint import Footprint
 from planners.problem import PlanningProblem
 from planners.registry import PLANNERS, plan
 from planners.route import Route
@@ -19,7 +21,10 @@ from planners.route import Route
 __all__ = [
     "AStarSettings",
     "AuditError",
+    "CostSettings",
+    "DijkstraSettings",
     "EnclosedError",
+    "Footprint",
     "NoRouteError",
     "NonFreeError",
     "OutsideMapError",
@@ -30,5 +35,6 @@ __all__ = [
     "Route",
     "TimeLimitError",
     "UnknownSpaceError",
+    "WeightedAStarSettings",
     "plan",
 ]

@@ -1,18 +1,19 @@
-"""A*: the shortest route over the moves between neighbouring cells."""
+"""A*, and what differs from it by a weight: Dijkstra's search and weighted A*."""
 
 from __future__ import annotations
 
-import time
-from typing import NamedTuple
+import math
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
 
-from groundmap.arrays import Floats, Ints
-from groundmap.settings import Settings
+from groundmap.arrays import Ints
 from planners.costmap import Costmap
-from planners.errors import Point, TimeLimitError
+from planners.ends import ends_of, waypoints_through
+from planners.engine import SLICE, Clock, Found, Pose, SearchSettings
 from planners.kernels.astar import (
+    BEST,
     EXHAUSTED,
     EXPANDED,
     FAR,
@@ -23,109 +24,117 @@ from planners.kernels.astar import (
     ROOT,
     SIZE,
     TARGET,
+    UNIT,
     advance,
     estimate,
+    inflated,
     trace,
 )
 from planners.kernels.heap import push
-from planners.links import Links, is_clear, links
-from planners.polyline import merged
+from planners.polyline import length_of
 
-SLICE = 100_000  # expansions between two looks at the clock: about 20 ms
 FIRST_ROOM = 1 << 14  # heap entries to begin with
 
 
-class AStarSettings(Settings):
+class AStarSettings(SearchSettings):
     """What A* can be told."""
 
-    time_limit: float | None = Field(30.0, ge=0, description="search time [s]; none: no limit")
+
+class DijkstraSettings(SearchSettings):
+    """What Dijkstra's search can be told."""
 
 
-class Found(NamedTuple):
-    """What a planner brings back."""
+class WeightedAStarSettings(SearchSettings):
+    """What weighted A* can be told."""
 
-    waypoints: Floats  #: shape (n, 2) [m, map], start and goal included
-    expanded: int  #: nodes the search expanded
-
-
-def astar(costmap: Costmap, settings: AStarSettings) -> Found | None:
-    """Return the shortest route, or None if there is none.
-
-    Shortest means: over orthogonal and diagonal moves between cell centres, with start and goal
-    joined to the centres around them by straight pieces.
-
-    Raises
-    ------
-    TimeLimitError
-    """
-    problem = costmap.problem
-    return AStar(costmap).search(problem.start_xy, problem.goal_xy, settings)
+    weight: float = Field(
+        1.5, ge=1, le=10, description="a route costs at most this many times the least"
+    )
 
 
 class AStar:
-    """The searches of one costmap: arrays are allocated once, and never cleared."""
+    """A* over orthogonal and diagonal moves between cell centres (Hart, Nilsson, Raphael 1968).
+
+    Start and goal are joined to the centres around them by straight pieces. Arrays are allocated
+    once, and never cleared.
+
+    Examples
+    --------
+    >>> from groundmap import ConfidenceGrid
+    >>> from planners.problem import PlanningProblem
+    >>> grid = ConfidenceGrid(resolution=1.0)
+    >>> grid.fuse(np.array([0, 0]), np.full((64, 64), -1.0, dtype=np.float32))
+    >>> problem = PlanningProblem(grid, start=(5.5, 5.5), goal=(9.5, 8.5), footprint=2.0)
+    >>> astar = AStar(Costmap.of(problem))
+    >>> astar.search(problem.start, problem.goal, AStarSettings()).waypoints.tolist()
+    [[5.5, 5.5], [8.5, 8.5], [9.5, 8.5]]
+    """
+
+    name: ClassVar[str] = "astar"
 
     def __init__(self, costmap: Costmap) -> None:
         cells = costmap.blocked.size
         self.costmap = costmap
-        self.moves = costmap.moves.ravel()
+        self.moves, self.costs = costmap.moves.ravel(), costmap.costs.ravel()
         self.labels = np.zeros((cells, 2), dtype=np.int64)
         self.query = 0
         self.heap = np.empty((FIRST_ROOM, 2), dtype=np.int64)
 
-    def search(self, start: Point, goal: Point, settings: AStarSettings) -> Found | None:
-        """Return the shortest route from start to goal [m, map], or None if there is none.
+    def weight(self, settings: SearchSettings) -> float:
+        """Return how much more than itself the estimate counts."""
+        return 1.0
+
+    def search(self, start: Pose, goal: Pose, settings: SearchSettings) -> Found | None:
+        """Return the route of least cost from start to goal, or None if there is none.
 
         Raises
         ------
         TimeLimitError
             Time ran out; with a limit of 0, always.
         """
-        began = time.perf_counter()
-        limit = settings.time_limit
-        radius = self.costmap.problem.footprint
-        if limit != 0 and is_clear(self.costmap, *self._in_cells(start, goal), radius=radius):
-            return Found(merged(np.array([start, goal])), 0)
-        targets = self._targets(links(self.costmap, goal, radius=radius))
-        state = self._seed(links(self.costmap, start, radius=radius), targets)
+        clock = Clock(self.name, settings.time_limit)
+        clock.check(0)
+        weight = self.weight(settings)
+        ends = ends_of(self.costmap, start, goal)
+        if ends.direct:
+            return Found(waypoints_through(self.costmap, start, goal, np.empty((0, 2), int)), 0)
+        scaled = round(weight * UNIT)
+        state = self._seed(ends.sources, ends.targets, scaled)
         status = -1
         while status not in (FOUND, EXHAUSTED):
-            if limit is not None and time.perf_counter() - began >= limit:
-                raise TimeLimitError("astar", time_limit=limit, expanded=int(state[EXPANDED]))
-            status = self._advance(targets, state)
+            clock.check(int(state[EXPANDED]))
+            status = self._advance(ends.targets, scaled, state)
         if status == EXHAUSTED:
             return None
-        return Found(self._waypoints(start, goal, int(state[TARGET])), int(state[EXPANDED]))
+        turns = trace(self.labels, self.costmap.width, int(state[TARGET]))[::-1]
+        cells = np.column_stack(np.divmod(turns, self.costmap.width))
+        waypoints = waypoints_through(self.costmap, start, goal, cells)
+        cost = float(state[BEST]) / ONE * self.costmap.window.resolution
+        # Where all metres are alike, the line's own length: merging end pieces may shorten it.
+        cost = length_of(waypoints) if self.costmap.uniform else cost
+        return Found(waypoints, int(state[EXPANDED]), bound=max(weight, 1.0), cost=cost)
 
-    def _in_cells(self, start: Point, goal: Point) -> tuple[Point, Point]:
-        (ax, ay), (bx, by) = self.costmap.to_cells([start, goal]).tolist()
-        return (ax, ay), (bx, by)
-
-    def _costs(self, lengths: Floats) -> Ints:
-        scaled: Ints = np.rint(lengths / self.costmap.window.resolution * ONE).astype(np.int64)
-        return scaled
-
-    def _targets(self, joined: Links) -> Ints:
-        return np.column_stack([joined.cells, self._costs(joined.lengths)])
-
-    def _seed(self, joined: Links, targets: Ints) -> Ints:
+    def _seed(self, sources: Ints, targets: Ints, weight: int) -> Ints:
         """Begin a query: put the sources on an empty heap."""
         self.query += 1
         state = np.array([0, FAR, -1, 0], dtype=np.int64)
         if len(targets) == 0:
             return state
-        for (row, col), cost in zip(joined.cells, self._costs(joined.lengths), strict=True):
+        for row, col, cost in sources.tolist():
             node = row * self.costmap.width + col
             self.labels[node] = cost, MARK * self.query + ROOT
-            h = estimate(row, col, targets)
+            h = inflated(estimate(row, col, targets), weight)
             state[SIZE] = push(self.heap, state[SIZE], cost + h, h, node)
         return state
 
-    def _advance(self, targets: Ints, state: Ints) -> int:
+    def _advance(self, targets: Ints, weight: int, state: Ints) -> int:
         status = advance(
             self.moves,
+            self.costs,
+            self.costmap.steps,
             self.costmap.width,
             targets,
+            weight,
             self.labels,
             self.query,
             self.heap,
@@ -136,8 +145,23 @@ class AStar:
             self.heap = np.concatenate([self.heap, np.empty_like(self.heap)])
         return status
 
-    def _waypoints(self, start: Point, goal: Point, last: int) -> Floats:
-        turns = trace(self.labels, self.costmap.width, last)[::-1]
-        cells = np.column_stack(np.divmod(turns, self.costmap.width))
-        centres = self.costmap.window.cell_to_world(cells)
-        return merged(np.concatenate([[start], centres, [goal]]))
+
+class Dijkstra(AStar):
+    """Dijkstra's search: A* without an estimate, to compare with."""
+
+    name = "dijkstra"
+
+    def weight(self, settings: SearchSettings) -> float:
+        """Return 0: the estimate doesn't count."""
+        return 0.0
+
+
+class WeightedAStar(AStar):
+    """Weighted A* (Pohl 1970): faster, for a route that costs at most `weight` times the least."""
+
+    name = "weighted_astar"
+
+    def weight(self, settings: SearchSettings) -> float:
+        """Return the weight that was asked for, up to 1/256."""
+        assert isinstance(settings, WeightedAStarSettings)
+        return math.floor(settings.weight * UNIT) / UNIT

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 import shapely
@@ -15,7 +18,7 @@ TOLERANCE = 1e-9  # [m]
 PIECE = 16  # [cells] the line is cut into pieces of that length, to look at few cells around it
 
 
-def audit(problem: PlanningProblem, waypoints: Floats) -> None:
+def audit(problem: PlanningProblem, waypoints: Floats, *, headings: Floats | None = None) -> None:
     """Check that a route joins start and goal and keeps its distance everywhere.
 
     The distance of the line to the square of every cell that the footprint must not touch is at
@@ -23,19 +26,24 @@ def audit(problem: PlanningProblem, waypoints: Floats) -> None:
     cells are the non-free ones and, unless the problem allows them, the unknown and contested
     ones, all that lies outside the map included, apart from unknown ones near the start.
 
+    With headings, a polygon footprint is swept along the poses instead of the disc around it: it
+    enters no such square, up to a nanometre.
+
     Parameters
     ----------
     problem : PlanningProblem
     waypoints : ndarray, shape (n, 2), n >= 2 [m, map]
+    headings : ndarray, shape (n,), optional [rad, map]
+        From planners that decide on them.
 
     Raises
     ------
     AuditError
     """
-    _check_ends(problem, waypoints)
+    _check_ends(problem, waypoints, headings)
     line = _line(waypoints)
     tolerance = TOLERANCE + 4.0 * float(np.spacing(np.abs(waypoints).max()))
-    reach = problem.footprint + 2.0 * problem.grid.resolution
+    reach = problem.radius + 2.0 * problem.grid.resolution
     low, high = waypoints.min(axis=0) - reach, waypoints.max(axis=0) + reach
     window = problem.grid.window(np.concatenate([low, high]))
     cells = _cells_near(window, line, reach)
@@ -43,11 +51,55 @@ def audit(problem: PlanningProblem, waypoints: Floats) -> None:
     squares = _squares(window, cells)
     forbidden = _forbidden(problem, states, squares, tolerance)
     names = np.array([CellState(state).name.lower() for state in states[forbidden]])
-    _check_distance(problem.footprint, line, squares[forbidden], names, tolerance)
+    if headings is None or problem.shape.polygon is None:
+        _check_distance(problem.radius, line, squares[forbidden], names, tolerance)
+    else:
+        swept = swept_areas(problem.shape.polygon, waypoints, headings)
+        _check_swept(swept, squares[forbidden], names, tolerance)
 
 
-def _check_ends(problem: PlanningProblem, waypoints: Floats) -> None:
-    if not np.isfinite(waypoints).all():
+def swept_areas(polygon: Floats, waypoints: Floats, headings: Floats) -> npt.NDArray[np.object_]:
+    """Return areas that hold what a polygon covers between each two poses.
+
+    Of each convex part, the hull of its two places, grown by as much as a turn makes a corner
+    bulge out of a straight piece.
+
+    Parameters
+    ----------
+    polygon : ndarray, shape (n, 2) [m, base_link]
+    waypoints : ndarray, shape (m, 2) [m, map]
+    headings : ndarray, shape (m,) [rad, map]
+
+    Returns
+    -------
+    ndarray of shapely geometries, shape (parts · (m - 1),)
+    """
+    outline = shapely.Polygon(polygon)
+    convex = outline.convex_hull.area - outline.area <= TOLERANCE**2
+    parts = [outline] if convex else outline_parts(outline)
+    cos, sin = np.cos(headings), np.sin(headings)
+    turns = np.array([[cos, -sin], [sin, cos]]).transpose(2, 0, 1)
+    turned = np.abs(np.angle(np.exp(1j * np.diff(headings))))
+    bulges = np.hypot(*polygon.T).max() * (1.0 - np.cos(turned / 2.0))
+    areas = []
+    for part in parts:
+        corners = shapely.get_coordinates(part)[:-1]
+        placed = np.einsum("mij,nj->mni", turns, corners) + waypoints[:, None]
+        pairs = np.concatenate([placed[:-1], placed[1:]], axis=1)
+        hulls = shapely.convex_hull(shapely.multipoints(list(pairs)))
+        areas.append(shapely.buffer(hulls, bulges, join_style="mitre"))
+    return np.concatenate(areas)
+
+
+def outline_parts(outline: shapely.Polygon) -> list[shapely.Geometry]:
+    """Return triangles that make up a polygon."""
+    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(outline))
+    return list(triangles)
+
+
+def _check_ends(problem: PlanningProblem, waypoints: Floats, headings: Floats | None) -> None:
+    turns = np.zeros(2) if headings is None else headings
+    if not (np.isfinite(waypoints).all() and np.isfinite(turns).all()):
         raise AuditError("is not finite", problem.start_xy, got=np.nan, needed=0.0)
     for name, asked, got in (
         ("start", problem.start_xy, waypoints[0]),
@@ -57,6 +109,17 @@ def _check_ends(problem: PlanningProblem, waypoints: Floats) -> None:
         if off > TOLERANCE:
             fault = f"misses the {name}"
             raise AuditError(fault, (float(got[0]), float(got[1])), got=off, needed=0.0)
+    if headings is not None:
+        _check_yaw("start", problem.start, waypoints[0], float(headings[0]))
+        _check_yaw("goal", problem.goal, waypoints[-1], float(headings[-1]))
+
+
+def _check_yaw(name: str, asked: Sequence[float] | Floats, place: Floats, heading: float) -> None:
+    if len(asked) > 2:
+        off = abs(math.remainder(heading - float(asked[2]), math.tau))
+        if off > TOLERANCE:
+            xy = (float(place[0]), float(place[1]))
+            raise AuditError(f"misses the yaw of the {name}", xy, got=off, needed=0.0)
 
 
 def _line(waypoints: Floats) -> shapely.Geometry:
@@ -91,7 +154,7 @@ def _forbidden(
     tolerance: float,
 ) -> Bools:
     forbidden: Bools = states != CellState.FREE
-    if problem.unknown == "allow":
+    if not problem.avoids_unknown:
         forbidden = states == CellState.NONFREE
     elif problem.clear_start:
         away = shapely.distance(shapely.Point(problem.start_xy), squares)
@@ -117,3 +180,20 @@ def _check_distance(
             fault = f"comes too near to a {names[i]} cell"
             place = (float(nearest[0]), float(nearest[1]))
             raise AuditError(fault, place, got=distance, needed=radius)
+
+
+def _check_swept(
+    swept: npt.NDArray[np.object_],
+    squares: npt.NDArray[np.object_],
+    names: npt.NDArray[np.str_],
+    tolerance: float,
+) -> None:
+    shrunk = shapely.buffer(squares, -tolerance, join_style="mitre")
+    tree = shapely.STRtree(shrunk)
+    hits = tree.query(swept, predicate="intersects")
+    if hits.size:
+        area, square = hits[:, 0]
+        overlap = shapely.intersection(swept[area], shrunk[square])
+        x, y = shapely.get_coordinates(shapely.point_on_surface(overlap))[0].tolist()
+        depth = float(np.sqrt(shapely.area(overlap)))
+        raise AuditError(f"sweeps a {names[square]} cell", (x, y), got=-depth, needed=0.0)

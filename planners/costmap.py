@@ -1,27 +1,30 @@
-"""What can be driven on: a pure function of the map and the problem."""
+"""What can be driven on, and what it costs: a pure function of the map and the problem."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import Bools, Bytes, Floats, Ints
-from groundmap.window import CellState, GridWindow
-from planners.errors import ProblemError
+from groundmap.arrays import Bools, Bytes, Floats, Ints, Ints32
+from groundmap.window import GridWindow
+from planners.costs import MAX_NON_OBSTACLE
+from planners.kernels.astar import DIAGONAL, ONE
 from planners.kernels.clearance import line_clearance
-from planners.lattice import NOWHERE, allowed_moves, squared_clearance, squared_need
+from planners.kernels.distance import NOWHERE, squared_distances
+from planners.lattice import allowed_moves, squared_clearance, squared_need
+from planners.layers import Layers, cap, layers_of, metres, padded_window
 from planners.problem import PlanningProblem
 
-MOST_CELLS = 2**25  # of a costmap: its lattice takes about 100 bytes for each
 SLACK = 5e-10  # [m] shortfall of clearance that is put down to the rounding of coordinates
 
 
 @dataclass(frozen=True, eq=False)
 class Costmap:
-    """Which cells are blocked, how far away they are, and which moves that allows.
+    """Which cells are blocked, where the footprint's centre may be, and what that costs.
 
     Attributes
     ----------
@@ -32,8 +35,12 @@ class Costmap:
     blocked, nonfree, cleared : ndarray of bool, shape (rows, cols)
         Cells that the footprint may not touch; those among them that are non-free; unknown cells
         that count as free because they are near the start.
-    squared : ndarray of int64, shape (2 rows + 1, 2 cols + 1) [(half cells)²]
-        Squared clearance on the half-cell lattice.
+    squared : ndarray of int32, shape (rows, cols) [(half cells)²]
+        Squared distance from cell centres to the nearest blocked square, up to what matters: the
+        footprint's radius and the inflation radius.
+    costs : ndarray of uint8, shape (rows, cols)
+        On Nav2's scale: 0 to 252 where the footprint's centre may be, 253 where it would touch
+        what is blocked, 254 on non-free cells, 255 on other blocked ones.
 
     Examples
     --------
@@ -42,8 +49,8 @@ class Costmap:
     >>> grid.fuse(np.array([0, 0]), np.full((64, 64), -1.0, dtype=np.float32))
     >>> problem = PlanningProblem(grid, start=(9, 9), goal=(60, 60), footprint=1.5)
     >>> costmap = Costmap.of(problem)
-    >>> costmap.blocked.shape, float(costmap.clearance.max())
-    ((68, 68), 31.5)
+    >>> costmap.blocked.shape, float(costmap.clearance.max()), costmap.costs[:5, 30].tolist()
+    ((68, 68), 31.5, [255, 255, 253, 0, 0])
     """
 
     problem: PlanningProblem
@@ -51,39 +58,119 @@ class Costmap:
     blocked: Bools
     nonfree: Bools
     cleared: Bools
-    squared: Ints
+    squared: Ints32
+    costs: Bytes
 
     @classmethod
     def of(cls, problem: PlanningProblem) -> Costmap:
         """Return the costmap of a problem whose start is on the map."""
-        window = _padded_window(problem)
-        states = window.states(epsilon=problem.epsilon)
-        nonfree = states == CellState.NONFREE
-        cleared = _cleared(problem, window) & (states == CellState.UNKNOWN)
-        free = (states == CellState.FREE) | cleared
-        blocked = nonfree if problem.unknown == "allow" else ~free
-        return cls(problem, window, blocked, nonfree, cleared, squared_clearance(blocked))
+        window = padded_window(problem)
+        return cls(problem, window, *layers_of(problem, window))
+
+    def updated(self, changed: npt.ArrayLike) -> Costmap:
+        """Return the costmap after cells of its map have changed.
+
+        Only what they touch is worked out again: the cells themselves, and the distances and
+        costs of cells within reach of the footprint's and the inflation radius.
+
+        Parameters
+        ----------
+        changed : array_like of int, shape (n, 2)
+            Cells [row, col] of the grid whose confidence, count or drop-offs changed. Where the
+            map has grown since, everything is worked out.
+        """
+        cells = np.asarray(changed, dtype=np.int64).reshape(-1, 2) - self.lower_cell
+        if len(cells) == 0:
+            return self
+        shape = np.array(self.blocked.shape)
+        # The ring of a cell and a half around the map: what grew touches it, or lies beyond.
+        if (cells < 1).any() or (cells >= shape - 1).any():
+            return Costmap.of(self.problem)
+        reach = math.isqrt(cap(self.problem)) // 2 + 2
+        first = np.maximum(cells.min(axis=0) - reach, 0)
+        last = np.minimum(cells.max(axis=0) + reach + 1, shape)
+        outer = np.maximum(first - reach, 0), np.minimum(last + reach, shape)
+        part = self._read(*outer)
+        here, inner = _slices(first, last), _slices(first - outer[0], last - outer[0])
+        renewed = {name: getattr(self, name).copy() for name in Layers._fields}
+        for name, values in layers_of(self.problem, part)._asdict().items():
+            renewed[name][here] = values[inner]
+        return Costmap(self.problem, _patched(self.window, part, _slices(*outer)), **renewed)
+
+    def _read(self, first: Ints, last: Ints) -> GridWindow:
+        """Return cells of the map as they are now, from [row, col] `first` up to `last`."""
+        size = self.window.resolution
+        low, high = first[::-1] + 0.5, last[::-1] - 0.5
+        return self.problem.grid.window(
+            np.concatenate([self.window.origin + low * size, self.window.origin + high * size])
+        )
+
+    @property
+    def radius(self) -> float:
+        """Distance that the footprint's centre keeps from what is blocked [m]."""
+        return self.problem.radius
 
     @property
     def width(self) -> int:
         """Cells in a row."""
         return int(self.blocked.shape[1])
 
+    @property
+    def lower_cell(self) -> Ints:
+        """Cell [row, col] of the grid that cell (0, 0) of the costmap is."""
+        grid = self.problem.grid
+        corner = (self.window.origin - grid.origin) / grid.resolution
+        return np.rint(corner).astype(np.int64)[::-1]
+
+    @property
+    def top(self) -> float:
+        """What a metre in a cell of cost 252 costs beyond its length [m/m]."""
+        return self.problem.costs.top(penalise=self.problem.unknown == "penalise")
+
+    @property
+    def uniform(self) -> bool:
+        """Whether every metre costs the same."""
+        return self.top == 0.0
+
     @cached_property
-    def clearance(self) -> Floats:
-        """Distance from cell centres to the nearest blocked square, shape (rows, cols) [m]."""
-        squared = self.squared[1::2, 1::2]
-        half = self.window.resolution / 2.0
-        return np.where(squared == NOWHERE, np.inf, np.sqrt(squared) * half)
+    def steps(self) -> Ints:
+        """Costs of moves by the sum of their two cells' costs, shape (2, 505).
+
+        The first row holds orthogonal moves, the second diagonal ones, in units of `ONE` a cell's
+        side. Each half of a move is as dear as the cell it is in: both directions cost the same.
+        """
+        factors = 1.0 + self.top * np.arange(2 * MAX_NON_OBSTACLE + 1) / (2.0 * MAX_NON_OBSTACLE)
+        steps: Ints = np.rint(np.array([[ONE], [DIAGONAL]]) * factors).astype(np.int64)
+        return steps
+
+    @cached_property
+    def stand(self) -> Bools:
+        """Cells on whose centre the footprint's centre may be, shape (rows, cols)."""
+        return self.costs <= MAX_NON_OBSTACLE
 
     @cached_property
     def moves(self) -> Bytes:
-        """Allowed moves for the footprint, shape (rows, cols)."""
-        return self.moves_for(squared_need(self.problem.footprint, self.window.resolution))
+        """Allowed moves between such cells, a bit each, shape (rows, cols)."""
+        return allowed_moves(self.stand)
 
-    def moves_for(self, need: int) -> Bytes:
-        """Return the moves that keep a squared clearance [(half cells)²], shape (rows, cols)."""
-        return allowed_moves(self.blocked, self.squared, need)
+    @cached_property
+    def all_squared(self) -> Ints32:
+        """As `squared`, however far, shape (rows, cols) [(half cells)²]."""
+        return squared_distances(self.blocked, NOWHERE)
+
+    @cached_property
+    def clearance(self) -> Floats:
+        """Distance from cell centres to the nearest blocked square, shape (rows, cols) [m]."""
+        return metres(self.all_squared, self.window.resolution)
+
+    @cached_property
+    def lattice(self) -> Ints:
+        """Squared clearance on the half-cell lattice, shape (2 rows + 1, 2 cols + 1)."""
+        return squared_clearance(self.blocked)
+
+    def stand_for(self, radius: float) -> Bools:
+        """Return where the centre of a disc of another radius [m] may be, shape (rows, cols)."""
+        return ~self.blocked & (self.all_squared >= squared_need(radius, self.window.resolution))
 
     def to_cells(self, points: npt.ArrayLike) -> Floats:
         """Return positions [m, map] in cells from the window's outer corner, shape (n, 2)."""
@@ -100,34 +187,15 @@ class Costmap:
         return line_clearance(self.blocked, self.to_cells(points)) * self.window.resolution
 
 
-def _padded_window(problem: PlanningProblem) -> GridWindow:
-    grid = problem.grid
-    bounds = grid.bounds()
-    if problem.clear_start:
-        start = np.array(problem.start_xy)
-        bounds[:2] = np.minimum(bounds[:2], start - problem.clear_radius)
-        bounds[2:] = np.maximum(bounds[2:], start + problem.clear_radius)
-    # One cell and a half: borders that rounding moves by a cell must not swallow the ring.
-    ring = 1.5 * grid.resolution * np.array([-1, -1, 1, 1])
-    cells = float(np.prod((bounds[2:] - bounds[:2]) / grid.resolution))
-    if cells > MOST_CELLS:
-        raise ProblemError(
-            "footprint",
-            f"one that leaves {MOST_CELLS} cells of map and cleared start at most",
-            f"radius {problem.footprint:g} m, which makes {cells:.3g}",
-            hint="Give a smaller footprint or clear_start_radius, or map with larger cells.",
-        )
-    return grid.window(bounds + ring)
+def _slices(first: Ints, last: Ints) -> tuple[slice, slice]:
+    rows, cols = map(slice, first.tolist(), last.tolist())
+    return rows, cols
 
 
-def _cleared(problem: PlanningProblem, window: GridWindow) -> Bools:
-    """Return which cells' squares come within the clear radius of the start."""
-    if not problem.clear_start:
-        return np.zeros(window.count.shape, dtype=np.bool_)
-    rows, cols = window.count.shape
-    x, y = (np.array(problem.start_xy) - window.origin) / window.resolution
-    col, row = np.arange(cols), np.arange(rows)
-    dx = np.maximum(np.maximum(col - x, x - col - 1), 0.0)
-    dy = np.maximum(np.maximum(row - y, y - row - 1), 0.0)
-    near: Bools = np.hypot(dx, dy[:, None]) * window.resolution <= problem.clear_radius
-    return near
+def _patched(window: GridWindow, part: GridWindow, box: tuple[slice, slice]) -> GridWindow:
+    """Return a copy of a window with a part of it replaced."""
+    names = ("confidence", "count", "drop_offs")
+    arrays = {name: getattr(window, name).copy() for name in names}
+    for name in names:
+        arrays[name][box] = getattr(part, name)
+    return replace(window, **arrays)

@@ -13,16 +13,15 @@ from groundmap.arrays import Bools, Ints
 from planners.costmap import Costmap
 from planners.errors import EnclosedError, Place, Point
 from planners.kernels.flood import flood
-from planners.lattice import squared_need
+from planners.lattice import allowed_moves, squared_need
 from planners.links import is_clear, links
 
 
 def enclosed(costmap: Costmap) -> EnclosedError:
     """Return the exception that says why start and goal are not joined."""
     problem, resolution = costmap.problem, costmap.window.resolution
-    need = squared_need(problem.footprint, resolution)
-    from_start = reachable(costmap, problem.start_xy, need=need)
-    from_goal = reachable(costmap, problem.goal_xy, need=need)
+    from_start = reachable(costmap, problem.start_xy, radius=costmap.radius)
+    from_goal = reachable(costmap, problem.goal_xy, radius=costmap.radius)
     place: Place = "start" if from_start.sum() < from_goal.sum() else "goal"
     fenced = from_start if place == "start" else from_goal
     nearest, distance = _nearest(costmap, from_start)
@@ -32,24 +31,23 @@ def enclosed(costmap: Costmap) -> EnclosedError:
         nearest=nearest,
         distance=distance,
         widest_gap=widest_way(costmap),
-        needed=2.0 * problem.footprint,
+        needed=2.0 * problem.radius,
     )
 
 
-def reachable(costmap: Costmap, xy: Point, *, need: int) -> Bools:
+def reachable(costmap: Costmap, xy: Point, *, radius: float) -> Bools:
     """Return which cell centres can be reached from a place, shape (rows, cols).
 
     Parameters
     ----------
     costmap : Costmap
     xy : tuple of float [m, map]
-    need : int [(half cells)²]
-        Squared clearance to keep on the way.
+    radius : float [m]
+        Clearance to keep on the way.
     """
-    radius = math.sqrt(need) * costmap.window.resolution / 2.0
     cells = links(costmap, xy, radius=radius).cells
     sources = cells[:, 0] * costmap.width + cells[:, 1]
-    mask: Bools = flood(costmap.moves_for(need).ravel(), costmap.width, sources)
+    mask: Bools = flood(allowed_moves(costmap.stand_for(radius)).ravel(), costmap.width, sources)
     return mask.reshape(costmap.blocked.shape)
 
 
@@ -63,7 +61,7 @@ def widest_way(costmap: Costmap) -> float:
     """
     problem, resolution = costmap.problem, costmap.window.resolution
     ends = [costmap.clearance_of(xy) for xy in (problem.start_xy, problem.goal_xy)]
-    radii = np.append(np.sqrt(np.unique(costmap.squared)) * resolution / 2.0, ends)
+    radii = np.append(np.sqrt(np.unique(costmap.lattice)) * resolution / 2.0, ends)
     radii = np.unique(radii[(radii > 0) & (radii <= min(ends))])
     low, high = -1, len(radii)  # joined at radii[low], not at radii[high]
     while low + 1 < high:
@@ -74,7 +72,7 @@ def widest_way(costmap: Costmap) -> float:
 
 def _joined(costmap: Costmap, radius: float) -> bool:
     """Whether a way on the lattice joins start and goal for a radius above 0 [m]."""
-    parts = _parts(costmap.squared >= squared_need(radius, costmap.window.resolution))
+    parts = _parts(costmap.lattice >= squared_need(radius, costmap.window.resolution))
     start, goal = costmap.problem.start_xy, costmap.problem.goal_xy
     at_start, at_goal = (
         set(parts[_points_at(costmap, xy, radius)].tolist()) for xy in (start, goal)

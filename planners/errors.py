@@ -18,6 +18,7 @@ that don't exist or are out of range raise `groundmap.errors.SettingsError`, as 
 
 from __future__ import annotations
 
+import math
 from typing import Literal, TypeAlias
 
 from groundmap.errors import FactualError, WrongValueError
@@ -54,8 +55,15 @@ class OutsideMapError(NoRouteError):
 y -9.75 to 9.75 m (box around the touched tiles); nothing was ever seen near it.
     """
 
-    def __init__(self, place: Place, xy: Point, *, bounds: tuple[float, ...]) -> None:
-        self.place, self.xy, self.bounds = place, xy, bounds
+    def __init__(
+        self,
+        place: Place,
+        xy: Point,
+        *,
+        bounds: tuple[float, ...],
+        nearest: Point | None = None,
+    ) -> None:
+        self.place, self.xy, self.bounds, self.nearest = place, xy, bounds, nearest
         spans = "x {:.2f} to {:.2f} m and y {:.2f} to {:.2f} m"
         extent = (
             f"which spans {spans.format(bounds[0], bounds[2], bounds[1], bounds[3])} "
@@ -65,7 +73,7 @@ y -9.75 to 9.75 m (box around the touched tiles); nothing was ever seen near it.
         )
         super().__init__(
             f"{_at(place, xy)}: outside the map: expected a place on it, {extent}; "
-            "nothing was ever seen near it."
+            f"nothing was ever seen near it.{_instead(xy, nearest)}"
         )
 
 
@@ -74,16 +82,26 @@ class NonFreeError(NoRouteError):
 
     Examples
     --------
-    >>> print(NonFreeError("goal", (12.3, 4.1), clearance=0.42, needed=0.9))
+    >>> print(NonFreeError("goal", (12.3, 4.1), clearance=0.42, needed=0.9, nearest=(12.3, 4.7)))
     goal (12.30, 4.10): the footprint (radius 0.90 m) overlaps non-free space; clearance there is \
-0.42 m.
+0.42 m. The nearest place for it is (12.30, 4.70), 0.60 m away.
     """
 
-    def __init__(self, place: Place, xy: Point, *, clearance: float, needed: float) -> None:
+    def __init__(
+        self,
+        place: Place,
+        xy: Point,
+        *,
+        clearance: float,
+        needed: float,
+        nearest: Point | None = None,
+        yaw: float | None = None,
+    ) -> None:
         self.place, self.xy, self.clearance, self.needed = place, xy, clearance, needed
+        self.nearest, self.yaw = nearest, yaw
         super().__init__(
-            f"{_at(place, xy)}: the footprint (radius {needed:.2f} m) overlaps non-free space; "
-            f"clearance there is {clearance:.2f} m."
+            f"{_at(place, xy)}: {_footprint(needed, yaw)} overlaps non-free space; "
+            f"clearance there is {clearance:.2f} m.{_instead(xy, nearest)}"
         )
 
 
@@ -97,12 +115,23 @@ class UnknownSpaceError(NoRouteError):
 begins 0.25 m away. Map that place, or plan with unknown='allow' (--unknown allow).
     """
 
-    def __init__(self, place: Place, xy: Point, *, clearance: float, needed: float) -> None:
+    def __init__(
+        self,
+        place: Place,
+        xy: Point,
+        *,
+        clearance: float,
+        needed: float,
+        nearest: Point | None = None,
+        yaw: float | None = None,
+    ) -> None:
         self.place, self.xy, self.clearance, self.needed = place, xy, clearance, needed
+        self.nearest, self.yaw = nearest, yaw
         super().__init__(
-            f"{_at(place, xy)}: the footprint (radius {needed:.2f} m) overlaps unknown or "
+            f"{_at(place, xy)}: {_footprint(needed, yaw)} overlaps unknown or "
             f"contested space, which begins {clearance:.2f} m away. "
             "Map that place, or plan with unknown='allow' (--unknown allow)."
+            f"{_instead(xy, nearest)}"
         )
 
 
@@ -201,3 +230,16 @@ def _gap(widest: float, needed: float) -> str:
 
 def _at(place: Place, xy: Point) -> str:
     return f"{place} ({xy[0]:.2f}, {xy[1]:.2f})"
+
+
+def _footprint(radius: float, yaw: float | None) -> str:
+    if yaw is None:
+        return f"the footprint (radius {radius:.2f} m)"
+    return f"the footprint, turned by {yaw:.2f} rad,"
+
+
+def _instead(xy: Point, nearest: Point | None) -> str:
+    if nearest is None:
+        return ""
+    away = math.dist(xy, nearest)
+    return f" The nearest place for it is ({nearest[0]:.2f}, {nearest[1]:.2f}), {away:.2f} m away."

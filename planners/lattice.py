@@ -6,13 +6,12 @@ cell's closed square marks its 3 x 3 points. The point of a square that is neare
 point is a lattice point again (clamp each coordinate), so a distance transform of the lattice
 gives distances to *squares*, squared and in half cells exact integers.
 
-Three look-ups check a whole move. Let a move go from centre (a, b) by (2, 0) or (2, 2) half cells,
-and a square span [X, X + 2] x [Y, Y + 2]; a and b are odd, X and Y even. At t in [0, 2] along the
-move, the squared distance is u(t)² + v(t)², where u is X - a - t, 0 or a + t - X - 2, and v
-likewise (constant, for an orthogonal move); the kinks are at integer t. Between kinks, if u and v
-don't grow in opposite senses, the minimum is at a kink or an end. If one grows as p + t and the
-other shrinks as q - t, it is at t = (q - p) / 2, and p and q are odd: an integer again. So it is
-attained at t = 0, 1 or 2: an end or the midpoint, all lattice points.
+A disc whose centre keeps its radius at the ends of a move keeps it all along. Take a square S and
+the block of cells that the move spans: two cells, or, for a diagonal, four whose centres all keep
+the radius. These centres span a segment, or a square; of its points, the nearest to S is a corner,
+or it lies beside S, as some corner does at the same distance, since S is aligned with the cells.
+(An S within the block is one of its cells, on whose centre nobody may be.) So the cells on which
+the centre may be are a bitmap that says all about moves.
 """
 
 from __future__ import annotations
@@ -23,8 +22,8 @@ import numpy as np
 from scipy import ndimage
 
 from groundmap.arrays import Bools, Bytes, Ints
+from planners.kernels.distance import NOWHERE
 
-NOWHERE = np.iinfo(np.int32).max  # squared distance to a blocked cell if there is none
 ROUNDING = 1e-12  # relative error granted to the radius: 2 * 0.3 / 0.1 is not quite 6
 
 
@@ -69,40 +68,36 @@ def squared_need(radius: float, resolution: float) -> int:
     return math.ceil((2.0 * radius / resolution) ** 2 * (1.0 - ROUNDING))
 
 
-def allowed_moves(blocked: Bools, squared: Ints, need: int) -> Bytes:
+def allowed_moves(stand: Bools) -> Bytes:
     """Return the allowed moves of every cell, a bit each, as in `planners.kernels.astar`.
 
-    A move is allowed if the whole of it keeps the clearance, and, for a diagonal, if both cells
-    that it passes between are not blocked (no corner is cut, even with a radius of 0).
+    An orthogonal move is allowed between two cells on which the footprint's centre may be, a
+    diagonal one if that holds for all four cells of the block: no corner is cut.
 
     Parameters
     ----------
-    blocked : ndarray of bool, shape (rows, cols)
-    squared : ndarray of int64, shape (2 rows + 1, 2 cols + 1) [(half cells)²]
-        From `squared_clearance`.
-    need : int [(half cells)²]
-        From `squared_need`.
+    stand : ndarray of bool, shape (rows, cols)
 
     Returns
     -------
     ndarray of uint8, shape (rows, cols)
+
+    Examples
+    --------
+    >>> allowed_moves(np.array([[True, True], [True, False]]))
+    array([[ 5, 16],
+           [64,  0]], dtype=uint8)
     """
-    clear = squared >= need
-    free = ~blocked
-    stand = free & clear[1::2, 1::2]
-    east = stand[:, :-1] & stand[:, 1:] & clear[1::2, 2:-1:2]
-    north = stand[:-1] & stand[1:] & clear[2:-1:2, 1::2]
-    around = free[:-1, :-1] & free[:-1, 1:] & free[1:, :-1] & free[1:, 1:]
-    corner = around & clear[2:-1:2, 2:-1:2]
-    northeast = corner & stand[:-1, :-1] & stand[1:, 1:]
-    northwest = corner & stand[:-1, 1:] & stand[1:, :-1]
-    moves = np.zeros(blocked.shape, dtype=np.uint8)
-    moves[:, :-1] |= east.view(np.uint8)
-    moves[:-1, :-1] |= northeast.view(np.uint8) << 1
-    moves[:-1] |= north.view(np.uint8) << 2
-    moves[:-1, 1:] |= northwest.view(np.uint8) << 3
-    moves[:, 1:] |= east.view(np.uint8) << 4
-    moves[1:, 1:] |= northeast.view(np.uint8) << 5
-    moves[1:] |= north.view(np.uint8) << 6
-    moves[1:, :-1] |= northwest.view(np.uint8) << 7
+    east = (stand[:, :-1] & stand[:, 1:]).view(np.uint8)
+    north = (stand[:-1] & stand[1:]).view(np.uint8)
+    block = east[:-1] & east[1:]
+    moves = np.zeros(stand.shape, dtype=np.uint8)
+    moves[:, :-1] |= east
+    moves[:-1, :-1] |= block << 1
+    moves[:-1] |= north << 2
+    moves[:-1, 1:] |= block << 3
+    moves[:, 1:] |= east << 4
+    moves[1:, 1:] |= block << 5
+    moves[1:] |= north << 6
+    moves[1:, :-1] |= block << 7
     return moves

@@ -19,6 +19,22 @@ class Crossed(NamedTuple):
     lengths: Floats  #: shape (n,): length of the line inside [cells]
 
 
+def length_of(points: Floats) -> float:
+    """Return the length of a polyline, in the points' unit.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, d), n >= 1
+
+    Examples
+    --------
+    >>> length_of(np.array([[0.0, 0.0], [3.0, 4.0], [3.0, 5.0]]))
+    6.0
+    """
+    steps = np.diff(points, axis=0)
+    return float(np.sqrt((steps * steps).sum(axis=1)).sum())
+
+
 def merged(points: Floats) -> Floats:
     """Return the polyline without inner points that repeat or lie exactly on a straight line.
 

@@ -7,13 +7,17 @@ from dataclasses import KW_ONLY, dataclass
 from typing import Literal, get_args
 
 import numpy as np
+import numpy.typing as npt
 
 from groundmap.arrays import Floats
 from groundmap.grid import ConfidenceGrid
 from groundmap.window import EPSILON
+from planners.costs import CostSettings
 from planners.errors import Point, ProblemError
+from planners.footprint import Footprint
 
-Unknown = Literal["avoid", "allow"]
+PLAIN = CostSettings()  # the shortest route is the best
+Unknown = Literal["avoid", "allow", "penalise"]
 
 
 @dataclass(frozen=True)
@@ -23,17 +27,21 @@ class PlanningProblem:
     Parameters
     ----------
     grid : ConfidenceGrid
-        A 2-D map.
+        A map, 2-D or 3-D.
     start, goal : sequence of float
-        x, y [m, map] and optionally yaw [rad].
-    footprint : float [m]
-        Radius of the robot.
-    unknown : {"avoid", "allow"}
-        Whether unknown and contested cells may lie under the swept footprint.
+        x, y (in 3-D: x, y, z) [m, map] and optionally yaw [rad].
+    footprint : float or array_like, shape (n, 2)
+        Radius of the robot [m], or the corners of its outline [m, base_link]. Planners that know
+        no heading keep the distance of a disc that holds the outline at every heading.
+    unknown : {"avoid", "allow", "penalise"}
+        Whether unknown and contested cells may lie under the swept footprint; penalised, they may,
+        at a cost (``costs.unknown_weight``).
+    costs : CostSettings, optional
+        What else makes a metre dear; nothing unless told.
     clear_start : bool, default True
         Whether *unknown* cells near the start count as free; non-free and contested ones never do.
     clear_start_radius : float [m], optional
-        Cells are near whose square comes within this distance of the start; twice the footprint
+        Cells are near whose square comes within this distance of the start; twice the footprint's
         radius unless told. (What a forward camera sees next to itself is a wedge narrower than
         the footprint: with only the cells under the footprint cleared, the disc could never
         leave.)
@@ -43,8 +51,8 @@ class PlanningProblem:
     Raises
     ------
     ProblemError
-        A place that is not 2 or 3 finite numbers, a footprint that is not a radius of 0 or more,
-        another grid than a 2-D one, an option out of its range.
+        A place that is not 2 or 3 finite numbers (in 3-D: 3 or 4), a footprint that is neither a
+        radius of 0 or more nor a simple polygon, no grid, an option out of its range.
 
     Examples
     --------
@@ -62,8 +70,9 @@ got (0, nan).
     _: KW_ONLY
     start: Sequence[float] | Floats
     goal: Sequence[float] | Floats
-    footprint: float
+    footprint: Footprint | float | npt.ArrayLike
     unknown: Unknown = "avoid"
+    costs: CostSettings = PLAIN
     clear_start: bool = True
     clear_start_radius: float | None = None
     epsilon: float = EPSILON
@@ -71,19 +80,39 @@ got (0, nan).
     def __post_init__(self) -> None:
         """Check every value, and turn numbers into floats."""
         if not isinstance(self.grid, ConfidenceGrid):
-            raise ProblemError("grid", "a 2-D ConfidenceGrid", repr(self.grid))
-        if self.grid.ndim != 2:
-            raise ProblemError("grid", "a 2-D ConfidenceGrid", f"one of {self.grid.ndim}-D")
-        object.__setattr__(self, "start", _pose("start", self.start))
-        object.__setattr__(self, "goal", _pose("goal", self.goal))
-        object.__setattr__(self, "footprint", _radius("footprint", self.footprint))
+            raise ProblemError("grid", "a ConfidenceGrid", repr(self.grid))
+        if not isinstance(self.costs, CostSettings):
+            raise ProblemError("costs", "CostSettings", repr(self.costs))
+        object.__setattr__(self, "start", _pose("start", self.start, self.grid.ndim))
+        object.__setattr__(self, "goal", _pose("goal", self.goal, self.grid.ndim))
+        if not isinstance(self.footprint, Footprint):
+            object.__setattr__(self, "footprint", Footprint.of(self.footprint))
+        if self.grid.ndim == 3 and not self.shape.is_disc:
+            raise ProblemError("footprint", "a radius, on a 3-D map", "a polygon")
         if self.clear_start_radius is not None:
             radius = _radius("clear_start_radius", self.clear_start_radius)
             object.__setattr__(self, "clear_start_radius", radius)
         if self.unknown not in get_args(Unknown):
-            raise ProblemError("unknown", "'avoid' or 'allow'", repr(self.unknown))
+            expected = "'avoid', 'allow' or 'penalise'"
+            raise ProblemError("unknown", expected, repr(self.unknown))
         if not 0 < self.epsilon < 1:
             raise ProblemError("epsilon", "a number between 0 and 1", repr(self.epsilon))
+
+    @property
+    def shape(self) -> Footprint:
+        """The footprint, whatever it was given as."""
+        assert isinstance(self.footprint, Footprint)
+        return self.footprint
+
+    @property
+    def radius(self) -> float:
+        """Radius of the disc that holds the footprint at every heading [m]."""
+        return self.shape.radius
+
+    @property
+    def avoids_unknown(self) -> bool:
+        """Whether unknown and contested cells are as bad as non-free ones."""
+        return self.unknown == "avoid"
 
     @property
     def start_xy(self) -> Point:
@@ -99,29 +128,23 @@ got (0, nan).
     def clear_radius(self) -> float:
         """How near unknown cells come to the start that count as free [m]."""
         if self.clear_start_radius is None:
-            return 2.0 * self.footprint
+            return 2.0 * self.radius
         return self.clear_start_radius
 
 
-def _pose(name: str, values: Sequence[float] | Floats) -> tuple[float, ...]:
-    expected = "x, y [m] and optionally yaw [rad], all finite"
+def _pose(name: str, values: Sequence[float] | Floats, ndim: int) -> tuple[float, ...]:
+    axes = "x, y" if ndim == 2 else "x, y, z"
+    expected = f"{axes} [m] and optionally yaw [rad], all finite"
     try:
         pose = tuple(float(value) for value in values)
     except (TypeError, ValueError) as error:
         raise ProblemError(name, expected, repr(values)) from error
-    if len(pose) not in (2, 3) or not np.isfinite(pose).all():
+    if len(pose) not in (ndim, ndim + 1) or not np.isfinite(pose).all():
         raise ProblemError(name, expected, repr(values))
     return pose
 
 
 def _radius(name: str, value: float) -> float:
-    expected = "a radius of 0 or more [m]"
-    if np.ndim(value) != 0:
-        raise ProblemError(name, expected, "a polygon", hint="Polygons are not supported yet.")
-    try:
-        radius = float(value)
-    except (TypeError, ValueError) as error:
-        raise ProblemError(name, expected, repr(value)) from error
-    if not (np.isfinite(radius) and radius >= 0):
-        raise ProblemError(name, expected, repr(value))
-    return radius
+    if not (np.isfinite(value) and value >= 0):
+        raise ProblemError(name, "a radius of 0 or more [m]", repr(value))
+    return float(value)

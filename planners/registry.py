@@ -2,32 +2,37 @@
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from groundmap.settings import Settings
-from planners.astar import AStarSettings, Found, astar
-from planners.audit import audit
-from planners.costmap import SLACK, Costmap
+from planners.answers import answer, costmap_of
+from planners.astar import (
+    AStar,
+    AStarSettings,
+    Dijkstra,
+    DijkstraSettings,
+    WeightedAStar,
+    WeightedAStarSettings,
+)
 from planners.enclosure import enclosed
-from planners.errors import NonFreeError, OutsideMapError, Place, ProblemError, UnknownSpaceError
-from planners.kernels.clearance import line_clearance
+from planners.engine import Engine, SearchSettings
+from planners.errors import ProblemError
 from planners.problem import PlanningProblem
 from planners.route import Route
 
 
 class Planner(NamedTuple):
-    """A planner, and the class of its settings."""
+    """A planner: its engine, and the class of its settings."""
 
-    search: Callable[[Costmap, Any], Found | None]
-    settings: type[Settings]
+    engine: type[Engine]
+    settings: type[SearchSettings]
 
 
-PLANNERS: dict[str, Planner] = {"astar": Planner(astar, AStarSettings)}
+PLANNERS: dict[str, Planner] = {
+    "astar": Planner(AStar, AStarSettings),
+    "dijkstra": Planner(Dijkstra, DijkstraSettings),
+    "weighted_astar": Planner(WeightedAStar, WeightedAStarSettings),
+}
 
 
 def plan(problem: PlanningProblem, planner: str = "astar", **settings: Any) -> Route:
@@ -39,7 +44,7 @@ def plan(problem: PlanningProblem, planner: str = "astar", **settings: Any) -> R
     planner : str, default "astar"
         A name in `PLANNERS`.
     **settings
-        The planner's settings, such as `planners.astar.AStarSettings`.
+        The planner's settings, such as `planners.AStarSettings`.
 
     Raises
     ------
@@ -58,6 +63,7 @@ def plan(problem: PlanningProblem, planner: str = "astar", **settings: Any) -> R
 
     Examples
     --------
+    >>> import numpy as np
     >>> from groundmap import ConfidenceGrid
     >>> grid = ConfidenceGrid(resolution=0.5)
     >>> grid.fuse(np.array([0, 0]), np.full((64, 64), -1.0, dtype=np.float32))
@@ -66,63 +72,23 @@ def plan(problem: PlanningProblem, planner: str = "astar", **settings: Any) -> R
     ([2.0, 2.0], 2.0, 'clean')
     """
     began = time.perf_counter()
-    if planner not in PLANNERS:
-        raise ProblemError("planner", f"one of {', '.join(sorted(PLANNERS))}", repr(planner))
-    search, settings_class = PLANNERS[planner]
+    engine_class, settings_class = named(planner)
     chosen = settings_class(**settings)
-    _check_on_map(problem)
-    costmap = Costmap.of(problem)
-    _check_space(costmap, "start")
-    _check_space(costmap, "goal")
-    found = search(costmap, chosen)
+    costmap = costmap_of(problem)
+    found = engine_class(costmap).search(tuple(problem.start), tuple(problem.goal), chosen)
     if found is None:
         raise enclosed(costmap)
-    seconds = time.perf_counter() - began
-    audit(problem, found.waypoints)
-    return Route.along(
-        costmap, found.waypoints, planner=planner, expanded=found.expanded, seconds=seconds
-    )
+    return answer(costmap, found, planner=planner, seconds=time.perf_counter() - began)
 
 
-def _check_on_map(problem: PlanningProblem) -> None:
-    """Check that start and goal lie on touched tiles.
+def named(planner: str) -> Planner:
+    """Return the planner of a name.
 
-    A start whose surroundings are cleared may stand beside them, as long as its footprint (or a
-    cell) reaches them: poses at the border of a tile are off by rounding.
+    Raises
+    ------
+    ProblemError
+        There is none; the sentence names those there are.
     """
-    grid = problem.grid
-    reach = max(problem.footprint, grid.resolution) if problem.clear_start else 0.0
-    places: tuple[tuple[Place, tuple[float, float], float], ...] = (
-        ("start", problem.start_xy, reach),
-        ("goal", problem.goal_xy, 0.0),
-    )
-    for place, xy, margin in places:
-        if not _touches_tile(problem, xy, margin):
-            bounds = tuple(grid.bounds().tolist()) if any(True for _ in grid.tiles()) else ()
-            raise OutsideMapError(place, xy, bounds=bounds)
-
-
-def _touches_tile(problem: PlanningProblem, xy: tuple[float, float], margin: float) -> bool:
-    grid = problem.grid
-    side = grid.tile_shape[0] * grid.resolution
-    x, y = (np.array(xy) - grid.origin) / side
-    for (row, col), _ in grid.tiles():
-        dx, dy = max(col - x, 0.0, x - col - 1), max(row - y, 0.0, y - row - 1)
-        if math.hypot(dx, dy) * side <= margin:
-            return True
-    return False
-
-
-def _check_space(costmap: Costmap, place: Place) -> None:
-    """Check that the footprint fits: the state of the place itself comes before what is near."""
-    problem = costmap.problem
-    xy = problem.start_xy if place == "start" else problem.goal_xy
-    col, row = np.floor(costmap.to_cells(xy)[0]).astype(np.int64)
-    unknown = costmap.blocked & ~costmap.nonfree
-    checks = [(costmap.nonfree, NonFreeError), (unknown, UnknownSpaceError)]
-    if unknown[row, col]:
-        checks.reverse()
-    for blocked, error in checks:
-        distance = line_clearance(blocked, costmap.to_cells(xy)) * costmap.window.resolution
-        if distance < problem.footprint - SLACK or blocked[row, col]:
-            raise error(place, xy, clearance=distance, needed=problem.footprint)
+    if planner not in PLANNERS:
+        raise ProblemError("planner", f"one of {', '.join(sorted(PLANNERS))}", repr(planner))
+    return PLANNERS[planner]

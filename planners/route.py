@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from os import PathLike
+from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 import shapely
+import yaml
 
 from groundmap.archive import write_atomically
 from groundmap.arrays import Floats
+from groundmap.errors import InputError
 from planners.costmap import Costmap
-from planners.polyline import Crossed, crossed
+from planners.engine import Found
+from planners.polyline import Crossed, crossed, length_of
+from planners.problem import PlanningProblem
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +31,15 @@ class Route:
     ----------
     waypoints : ndarray, shape (n, 2), n >= 2 [m, map]
         Start, turning points, goal; exactly collinear points are merged.
+    headings : ndarray, shape (n,) [rad, map]
+        Where the robot looks at each waypoint: as the planner decided, else along the next piece
+        (at the goal: the yaw asked for, or along the last piece).
     length : float [m]
+    cost : float [m]
+        The length, where the problem says so with dear metres counted more.
+    bound : float or None
+        The cost is at most this many times the least that the planner could have found; None if
+        it knows no bound.
     min_clearance : float [m]
         Distance of the line to the nearest cell it must not touch (its square), exact; infinite
         on a map without such cells.
@@ -51,7 +65,10 @@ class Route:
     """
 
     waypoints: Floats
+    headings: Floats
     length: float
+    cost: float
+    bound: float | None
     min_clearance: float
     mean_clearance: float
     min_confidence: float
@@ -65,25 +82,29 @@ class Route:
     audit: str = "clean"
 
     @classmethod
-    def along(
-        cls, costmap: Costmap, waypoints: Floats, *, planner: str, expanded: int, seconds: float
-    ) -> Route:
-        """Return the route along `waypoints`, measured on the costmap.
+    def along(cls, costmap: Costmap, found: Found, *, planner: str, seconds: float) -> Route:
+        """Return the route that a planner found, measured on the costmap.
 
         Parameters
         ----------
         costmap : Costmap
-        waypoints : ndarray, shape (n, 2), n >= 2 [m, map]
-        planner, expanded, seconds
+        found : Found
+        planner, seconds
             As in the attributes.
         """
+        waypoints = found.waypoints
         line = crossed(costmap.to_cells(waypoints))
         rows, cols = line.cells.T
         sureness = -costmap.window.confidence[rows, cols].astype(np.float64)
         unknown = costmap.window.count[rows, cols] == 0
+        length = length_of(waypoints)
+        headings = found.headings
         return cls(
             waypoints=waypoints,
-            length=float(np.hypot(*np.diff(waypoints, axis=0).T).sum()),
+            headings=_headings(waypoints, costmap.problem) if headings is None else headings,
+            length=length,
+            cost=length if found.cost is None else found.cost,
+            bound=found.bound,
             min_clearance=costmap.clearance_of(waypoints),
             mean_clearance=_mean(costmap.clearance[rows, cols], line.lengths),
             min_confidence=float(sureness.min()) + 0.0,  # + 0.0: an unknown cell's -0.0 is 0.0
@@ -91,7 +112,7 @@ class Route:
             unknown_length=float(line.lengths[unknown].sum()) * costmap.window.resolution,
             start_unknown_area=_start_unknown_area(costmap, waypoints, line),
             planner=planner,
-            expanded=expanded,
+            expanded=found.expanded,
             seconds=seconds,
             frame=costmap.problem.grid.frame,
         )
@@ -100,6 +121,7 @@ class Route:
         """Return all fields as plain Python values; an infinite clearance as None, as in JSON."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         values["waypoints"] = self.waypoints.tolist()
+        values["headings"] = self.headings.tolist()
         for name in ("min_clearance", "mean_clearance"):
             values[name] = values[name] if math.isfinite(values[name]) else None
         return values
@@ -111,6 +133,58 @@ class Route:
         geometry = {"type": "LineString", "coordinates": coordinates}
         return {"type": "Feature", "geometry": geometry, "properties": properties}
 
+    def to_path(self) -> dict[str, Any]:
+        """Return a dict that looks like ROS's nav_msgs/Path: poses with quaternions [map].
+
+        Examples
+        --------
+        >>> from groundmap import ConfidenceGrid
+        >>> from planners import PlanningProblem, plan
+        >>> grid = ConfidenceGrid(resolution=0.5)
+        >>> grid.fuse(np.array([0, 0]), np.full((64, 64), -1.0, dtype=np.float32))
+        >>> route = plan(PlanningProblem(grid, start=(2.25, 2.25), goal=(2.25, 6), footprint=0.9))
+        >>> pose = route.to_path()["poses"][0]["pose"]
+        >>> pose["position"], round(pose["orientation"]["z"], 3)
+        ({'x': 2.25, 'y': 2.25, 'z': 0.0}, 0.707)
+        """
+        header = {"frame_id": self.frame, "stamp": {"sec": 0, "nanosec": 0}}
+        poses = [
+            {
+                "header": header,
+                "pose": {
+                    "position": {"x": x, "y": y, "z": 0.0},
+                    "orientation": _quaternion(yaw),
+                },
+            }
+            for (x, y), yaw in zip(self.waypoints.tolist(), self.headings.tolist(), strict=True)
+        ]
+        return {"header": header, "poses": poses}
+
+    def to_csv(self) -> str:
+        """Return a line per waypoint: x [m], y [m], yaw [rad], distance along the route [m]."""
+        along = np.append(0.0, np.cumsum(np.hypot(*np.diff(self.waypoints, axis=0).T)))
+        table = np.column_stack([self.waypoints, self.headings, along])
+        lines = [",".join(map(repr, row)) for row in table.tolist()]
+        return "\n".join(["x,y,yaw,distance", *lines, ""])
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the route to a file, all or nothing; the name's ending says how.
+
+        ``.geojson`` or ``.json``: a GeoJSON Feature; ``.csv``: see `to_csv`; ``.yaml``: see
+        `to_path`, as ``ros2 topic pub`` takes it.
+
+        Raises
+        ------
+        InputError
+            Another ending.
+        OSError
+            The folder does not exist or can't be written to.
+        """
+        kind = Path(path).suffix.lower()
+        if kind not in WRITERS:
+            raise InputError("path", f"a name that ends in {' or '.join(WRITERS)}", repr(str(path)))
+        _write(path, WRITERS[kind](self))
+
     def save_geojson(self, path: str | PathLike[str]) -> None:
         """Write the GeoJSON Feature to a file, all or nothing.
 
@@ -119,12 +193,42 @@ class Route:
         OSError
             The folder does not exist or can't be written to.
         """
-        text = json.dumps(self.to_geojson(), indent=2) + "\n"
+        _write(path, _geojson(self))
 
-        def write(stream: IO[bytes]) -> None:
-            stream.write(text.encode())
 
-        write_atomically(path, write)
+def _geojson(route: Route) -> str:
+    return json.dumps(route.to_geojson(), indent=2) + "\n"
+
+
+def _path_yaml(route: Route) -> str:
+    return yaml.safe_dump(route.to_path(), sort_keys=False)
+
+
+WRITERS: dict[str, Callable[[Route], str]] = {
+    ".geojson": _geojson,
+    ".json": _geojson,
+    ".csv": Route.to_csv,
+    ".yaml": _path_yaml,
+}
+
+
+def _write(path: str | PathLike[str], text: str) -> None:
+    def write(stream: IO[bytes]) -> None:
+        stream.write(text.encode())
+
+    write_atomically(path, write)
+
+
+def _headings(waypoints: Floats, problem: PlanningProblem) -> Floats:
+    """Return where a robot looks that drives along a line; standing, it looks along x."""
+    dx, dy = np.diff(waypoints, axis=0).T
+    headings = np.arctan2(dy, dx)
+    last = problem.goal[2] if len(problem.goal) > 2 else headings[-1]
+    return np.append(headings, last)
+
+
+def _quaternion(yaw: float) -> dict[str, float]:
+    return {"x": 0.0, "y": 0.0, "z": math.sin(yaw / 2.0), "w": math.cos(yaw / 2.0)}
 
 
 def _mean(values: Floats, weights: Floats) -> float:
@@ -138,6 +242,6 @@ def _start_unknown_area(costmap: Costmap, waypoints: Floats, line: Crossed) -> f
     centres = costmap.window.cell_to_world(np.argwhere(costmap.cleared))
     distances = shapely.distance(shapely.linestrings(waypoints), shapely.points(centres))
     used = np.zeros_like(costmap.cleared)
-    used[costmap.cleared] = distances <= costmap.problem.footprint
+    used[costmap.cleared] = distances <= costmap.radius
     used[tuple(line.cells.T)] = True
     return float((used & costmap.cleared).sum()) * costmap.window.resolution**2

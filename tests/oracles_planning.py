@@ -63,12 +63,13 @@ def ringed(blocked: Bools) -> Bools:
 
 
 def move_allowed(blocked: Bools, a: tuple[int, int], b: tuple[int, int], radius: float) -> bool:
-    """Whether the straight move between two neighbouring cells' centres keeps `radius` [cells]."""
-    inside = all(0 <= i < n for i, n in zip(b, blocked.shape, strict=True))
-    if not inside or any(blocked[cell] for cell in product((a[0], b[0]), (a[1], b[1]))):
+    """Whether a disc may stand on all cells of the block that a move spans [cells]."""
+    if not all(0 <= i < n for i, n in zip(b, blocked.shape, strict=True)):
         return False
-    line = shapely.LineString([(a[1] + 0.5, a[0] + 0.5), (b[1] + 0.5, b[0] + 0.5)])
-    return bool(shapely.distance(line, union_of_squares(blocked)) >= radius - 1e-9)
+    block = list(product({a[0], b[0]}, {a[1], b[1]}))
+    centres = shapely.points([(col + 0.5, row + 0.5) for row, col in block])
+    away = shapely.distance(centres, union_of_squares(blocked)) >= radius - 1e-9
+    return bool(away.all()) and not any(blocked[cell] for cell in block)
 
 
 def shortest_lengths(blocked: Bools, source: tuple[int, int], radius: float) -> Floats:

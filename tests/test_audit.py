@@ -34,7 +34,7 @@ def random_route(seed: int) -> tuple[PlanningProblem, Route]:
 @pytest.mark.parametrize("seed", range(8))
 def test_a_route_passes_for_its_min_clearance_and_not_for_more(seed: int) -> None:
     problem, route = random_route(seed)
-    assert route.min_clearance >= problem.footprint - 1e-9
+    assert route.min_clearance >= problem.radius - 1e-9
     audit(with_radius(problem, route.min_clearance), route.waypoints)
     with pytest.raises(AuditError, match=r"comes too near to a (nonfree|unknown) cell"):
         audit(with_radius(problem, route.min_clearance + 1e-6), route.waypoints)
@@ -57,7 +57,7 @@ def test_a_route_nudged_into_an_obstacle_is_refused(seed: int) -> None:
     obstacles = window.cell_to_world(np.argwhere(window.confidence > 0))
     waypoints = route.waypoints.copy()
     nearest = np.hypot(*(obstacles - waypoints[1]).T).argmin()
-    waypoints[1] = obstacles[nearest] + problem.footprint * 0.5
+    waypoints[1] = obstacles[nearest] + problem.radius * 0.5
     with pytest.raises(AuditError, match="comes too near to a nonfree cell at"):
         audit(problem, waypoints)
 

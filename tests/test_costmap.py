@@ -22,7 +22,13 @@ from oracles_planning import (
 from planners import PlanningProblem
 from planners.costmap import Costmap
 from planners.kernels.astar import COLS, ROWS
-from planners.lattice import NOWHERE, allowed_moves, squared_clearance, squared_need
+from planners.kernels.distance import NOWHERE, squared_distances
+from planners.lattice import allowed_moves, squared_clearance, squared_need
+
+def standing(blocked: Bools, radius: float) -> Bools:
+    """Return the cells on whose centre a disc fits."""
+    return ~blocked & (squared_distances(blocked, NOWHERE) >= squared_need(radius, 1.0))
+
 
 RADII = [0.0, 0.3, 0.5, np.sqrt(0.5), 0.9, 1.0, 1.5, np.sqrt(2.5), 2.2]
 
@@ -37,10 +43,10 @@ def test_lattice_clearance_is_the_distance_to_the_union_of_blocked_squares(block
 
 @given(masks(side=6), st.sampled_from(RADII))
 @settings(max_examples=40, deadline=None)
-def test_a_move_is_allowed_if_the_whole_of_it_keeps_the_distance(
+def test_a_move_is_allowed_if_the_disc_fits_on_every_cell_of_its_block(
     blocked: Bools, radius: float
 ) -> None:
-    moves = allowed_moves(blocked, squared_clearance(blocked), squared_need(radius, 1.0))
+    moves = allowed_moves(standing(blocked, radius))
     for row, col in np.ndindex(blocked.shape):
         for k in range(8):
             there = (row + int(ROWS[k]), col + int(COLS[k]))
@@ -48,9 +54,31 @@ def test_a_move_is_allowed_if_the_whole_of_it_keeps_the_distance(
             assert bool(moves[row, col] >> k & 1) == expected
 
 
+@given(masks(side=7), st.sampled_from(RADII))
+@settings(max_examples=60, deadline=None)
+def test_what_allowed_moves_span_keeps_the_distance_everywhere(
+    blocked: Bools, radius: float
+) -> None:
+    moves = allowed_moves(standing(blocked, radius))
+    obstacles = union_of_squares(blocked)
+    east, northeast, north = (np.argwhere(moves >> k & 1) + 0.5 for k in range(3))
+    spans = [shapely.box(x, y, x + 1, y + 1) for y, x in northeast]
+    spans += [shapely.LineString([(x, y), (x + 1, y)]) for y, x in east]
+    spans += [shapely.LineString([(x, y), (x, y + 1)]) for y, x in north]
+    assert (shapely.distance(np.array(spans, dtype=object), obstacles) >= radius - 1e-9).all()
+
+
+@given(masks(side=14), st.sampled_from([0, 1, 5, 30, NOWHERE]))
+def test_distances_of_centres_are_those_of_the_lattice_up_to_the_cap(
+    blocked: Bools, cap: int
+) -> None:
+    centres = squared_clearance(blocked)[1::2, 1::2]
+    np.testing.assert_array_equal(squared_distances(blocked, cap), np.minimum(centres, cap))
+
+
 @given(masks())
 def test_moves_are_symmetric(blocked: Bools) -> None:
-    moves = allowed_moves(blocked, squared_clearance(blocked), 3)
+    moves = allowed_moves(~blocked)
     for k in range(4):
         forth = np.argwhere(moves >> k & 1)
         back = forth + np.array([ROWS[k], COLS[k]])

@@ -16,7 +16,8 @@ from PIL import Image
 
 from groundmap.errors import FileFormatError, InputError
 from groundmap.grid import ConfidenceGrid
-from groundmap.io.map_images import BlockedMap, read_movingai_map, read_ros_map
+from groundmap.io.map_images import BlockedMap, read_ros_map
+from groundmap.io.movingai import read_movingai_map
 from groundmap.io.ros_map import write_ros_map
 from groundmap.window import CellState
 from strategies import rngs

@@ -48,15 +48,16 @@ def problem(grid: ConfidenceGrid = FIELD, **values: Any) -> PlanningProblem:
         ({"footprint": -0.1}, "footprint: expected a radius of 0 or more .*, got -0.1"),
         ({"footprint": math.nan}, "footprint: expected a radius of 0 or more .*, got nan"),
         ({"footprint": "wide"}, "footprint: expected a radius .*, got 'wide'"),
-        ({"footprint": [(0, 0), (1, 0), (1, 1)]}, "footprint: .* Polygons are not supported yet"),
+        ({"footprint": [(0, 0), (1, 1), (1, 0), (0, 1)]}, r"footprint: .* meets itself at \(0.5"),
+        ({"costs": {"clearance_weight": 1}}, "costs: expected CostSettings, got {'clear"),
         ({"clear_start_radius": -1}, "clear_start_radius: expected a radius of 0 or more"),
-        ({"unknown": "perhaps"}, "unknown: expected 'avoid' or 'allow', got 'perhaps'"),
+        ({"unknown": "perhaps"}, "unknown: expected 'avoid', 'allow' or 'penalise', got 'perhaps'"),
         ({"epsilon": 0}, "epsilon: expected a number between 0 and 1, got 0"),
         (
             {"grid": ConfidenceGrid(origin=(0, 0, 0))},
-            "grid: expected a 2-D ConfidenceGrid, got one of 3-D",
+            r"start: expected x, y, z \[m\] and optionally yaw \[rad\], all finite, got \(9, 9\)",
         ),
-        ({"grid": "map.npz"}, "grid: expected a 2-D ConfidenceGrid, got 'map.npz'"),
+        ({"grid": "map.npz"}, "grid: expected a ConfidenceGrid, got 'map.npz'"),
     ],
 )
 def test_a_problem_that_cannot_be_posed_is_refused(values: dict[str, Any], sentence: str) -> None:

@@ -1,4 +1,4 @@
-"""Maps that others drew: those of Nav2's map_server, and of the MovingAI benchmark."""
+"""Maps that others drew: blocked cells in memory, and Nav2's map_server files."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ import yaml
 from PIL import Image
 
 from groundmap.arrays import Bools, Floats
-from groundmap.errors import FileFormatError, InputError
+from groundmap.errors import FileFormatError
+from groundmap.grid import ConfidenceGrid
 from groundmap.io.rows import opened
 
 ROS_KEYS = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
-PASSABLE, BLOCKED = ".GS", "@OTW"
 
 
 class BlockedMap(NamedTuple):
@@ -26,6 +26,35 @@ class BlockedMap(NamedTuple):
     unknown: Bools  #: shape (rows, cols); neither blocked nor free
     resolution: float  #: side of a cell [m]
     origin: tuple[float, float]  #: (x, y) of the outer corner of cell (0, 0) [m]
+
+
+class BlockedVoxels(NamedTuple):
+    """Which cells of a 3-D map are blocked; indexed ``[layer, row, col]``, layers along z."""
+
+    blocked: Bools  #: shape (layers, rows, cols)
+    resolution: float  #: side of a voxel [m]
+    origin: tuple[float, float, float]  #: (x, y, z) of the outer corner of voxel (0, 0, 0) [m]
+
+
+def grid_of(found: BlockedMap | BlockedVoxels, *, frame: str = "map") -> ConfidenceGrid:
+    """Return a map to plan on: as if one view had seen every cell that is not unknown.
+
+    Blocked cells have confidence 1, free ones -1.
+
+    Examples
+    --------
+    >>> blocked, unknown = np.array([[True, False, False]]), np.array([[False, False, True]])
+    >>> grid = grid_of(BlockedMap(blocked, unknown, 0.5, (1.0, 2.0)))
+    >>> xy = [(1.1, 2.1), (1.6, 2.1), (2.1, 2.1)]
+    >>> grid.confidence_at(xy).tolist(), grid.count_at(xy).tolist()
+    ([1.0, -1.0, 0.0], [1, 1, 0])
+    """
+    grid = ConfidenceGrid(resolution=found.resolution, origin=found.origin, frame=frame)
+    z = np.where(found.blocked, np.float32(1.0), np.float32(-1.0))
+    if isinstance(found, BlockedMap):
+        z[found.unknown] = 0.0
+    grid.fuse(np.zeros(z.ndim, dtype=np.int64), z)
+    return grid
 
 
 def read_ros_map(path: str | PathLike[str]) -> BlockedMap:
@@ -63,46 +92,6 @@ def read_ros_map(path: str | PathLike[str]) -> BlockedMap:
     darkness = _read_darkness(path, keys["image"], negate=bool(negate))[::-1]
     blocked = darkness > occupied
     return BlockedMap(blocked, ~blocked & (darkness >= free), resolution, origin)
-
-
-def read_movingai_map(path: str | PathLike[str], *, resolution: float = 1.0) -> BlockedMap:
-    """Read a ``.map`` of the MovingAI benchmark.
-
-    ``.``, ``G`` and ``S`` (swamp) are free; ``@``, ``O``, ``T`` (trees) and ``W`` (water) are
-    blocked. The file's first row is row 0, at y = 0: a query's x and y are col and row. Where y
-    points upwards the map therefore shows as in a mirror.
-
-    Parameters
-    ----------
-    path : path
-    resolution : float, default 1 [m]
-        Side of a cell.
-
-    Raises
-    ------
-    FileFormatError
-        A file that is missing, a header without sizes, a row too many, too few, too short or too
-        long, an unknown kind of cell.
-    InputError
-        A resolution that is not above 0.
-    """
-    if not (math.isfinite(resolution) and resolution > 0):
-        raise InputError("resolution", "a number above 0 [m]", str(resolution))
-    path = Path(path)
-    with opened(path) as stream:
-        lines = [line.rstrip() for line in stream]
-    first, rows, cols = _movingai_header(path, lines)
-    while len(lines) > first and not lines[-1]:
-        lines.pop()
-    cells = lines[first:]
-    for number, line in enumerate(cells[:rows], start=first + 1):
-        _check_row(path, line, number, cols)
-    if len(cells) != rows:
-        hint = "Was the file cut short?" if len(cells) < rows else ""
-        raise FileFormatError(path, f"{rows} rows", str(len(cells)), hint=hint)
-    kinds = np.frombuffer("".join(cells).encode(), dtype="S1").reshape(rows, cols)
-    blocked = np.isin(kinds, np.frombuffer(BLOCKED.encode(), dtype="S1"))
-    return BlockedMap(blocked, np.zeros_like(blocked), float(resolution), (0.0, 0.0))
 
 
 def _read_yaml(path: Path) -> dict[str, Any]:
@@ -163,34 +152,3 @@ def _read_darkness(path: Path, name: Any, *, negate: bool) -> Floats:
     grey = pixels.sum(axis=-1, dtype=np.int64)
     darkness: Floats = (grey if negate else white - grey) / white
     return darkness
-
-
-def _movingai_header(path: Path, lines: list[str]) -> tuple[int, int, int]:
-    """Return how many lines the header has, and the map's rows and columns."""
-    sizes: dict[str, int] = {}
-    for number, line in enumerate(lines, start=1):
-        if line == "map":
-            break
-        key, _, value = line.partition(" ")
-        if key in ("height", "width"):
-            if not (value.strip().isdecimal() and int(value) > 0):
-                raise FileFormatError(path, f"{key} and a number above 0", repr(line), line=number)
-            sizes[key] = int(value)
-        elif key not in ("type", "version"):
-            expected = "type, height, width or map"
-            raise FileFormatError(path, expected, repr(line[:60]), line=number)
-    else:
-        raise FileFormatError(path, "a line 'map'", "none")
-    for key in ("height", "width"):
-        if key not in sizes:
-            raise FileFormatError(path, f"{key} before the map", "none", line=number)
-    return number, sizes["height"], sizes["width"]
-
-
-def _check_row(path: Path, line: str, number: int, cols: int) -> None:
-    if len(line) != cols:
-        raise FileFormatError(path, f"{cols} cells", str(len(line)), line=number)
-    strange = line.translate(dict.fromkeys(map(ord, PASSABLE + BLOCKED)))
-    if strange:
-        expected = f"cells of {' '.join(PASSABLE + BLOCKED)}"
-        raise FileFormatError(path, expected, repr(strange[0]), line=number)

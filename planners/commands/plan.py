@@ -29,7 +29,7 @@ def plan_command(
         Path | None, typer.Option(help="Draw map and route: .png, .pdf or .svg.")
     ] = None,
     unknown: Annotated[
-        str, typer.Option(help="Unknown and contested space: avoid, or allow.")
+        str, typer.Option(help="Unknown and contested space: avoid, allow or penalise.")
     ] = "avoid",
     clear_start: Annotated[
         bool, typer.Option(help="Count unknown cells near the start as free.")

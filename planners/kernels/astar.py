@@ -1,9 +1,9 @@
 """A* on an 8-connected grid, in slices, so that Python can watch the clock in between.
 
-Costs are integers: a cell's side is `ONE`, its diagonal `DIAGONAL`. Sums are then exact, a query
-and its reverse cost the same, and equal keys really tie (with floats, f = g + h of equally good
-nodes differs in the last bit, and tie-breaking is lost). 2^-32 of a cell is the rounding per move;
-int64 holds paths of 2^31 cells.
+Costs are integers: a cell's side is `ONE`, its diagonal `DIAGONAL`, more where cells are dear.
+Sums are then exact, a query and its reverse cost the same, and equal keys really tie (with floats,
+f = g + h of equally good nodes differs in the last bit, and tie-breaking is lost). 2^-32 of a cell
+is the rounding per move; int64 holds paths of 2^31 cells.
 
 Moves are bits: bit k of ``moves[node]`` says whether the step (ROWS[k], COLS[k]) is allowed,
 counter-clockwise from east (+x): E, NE, N, NW, W, SW, S, SE.
@@ -25,6 +25,7 @@ MARK, CLOSED, CAME, ROOT = 32, 16, 15, 8  # parts of a mark; ROOT: no move led h
 
 SLICE_DONE, FOUND, EXHAUSTED, HEAP_FULL = range(4)  # what `advance` returns
 SIZE, BEST, TARGET, EXPANDED = range(4)  # entries of `state`
+UNIT = 256  # the weight of the estimate that makes it A*'s own
 FAR = np.iinfo(np.int64).max
 
 
@@ -44,10 +45,21 @@ def estimate(row: int, col: int, targets: Ints) -> int:
 
 
 @njit(cache=True, nogil=True)
+def inflated(h: int, weight: int) -> int:
+    """Return an estimate times a weight in 1/256; dividing first, so that it can't overflow."""
+    if weight == 0:
+        return 0
+    return h + (h >> 8) * (weight - UNIT)
+
+
+@njit(cache=True, nogil=True)
 def advance(
     moves: Bytes,
+    costs: Bytes,
+    steps: Ints,
     width: int,
     targets: Ints,
+    weight: int,
     labels: Ints,
     query: int,
     heap: Ints,
@@ -60,10 +72,18 @@ def advance(
     ----------
     moves : ndarray of uint8, shape (cells,)
         Allowed moves of every cell, row by row; none may leave the grid.
+    costs : ndarray of uint8, shape (cells,)
+        What cells cost beyond their size, 0 to 252; of cells that moves lead to.
+    steps : ndarray of int64, shape (2, 505)
+        Costs of orthogonal and of diagonal moves by the sum of their cells' costs; those of
+        costs 0 are `ONE` and `DIAGONAL`, and none is less.
     width : int
         Cells in a row.
     targets : ndarray of int64, shape (n, 3)
         Row, column and final cost of the cells that are joined to the goal.
+    weight : int
+        Of the estimate, in 1/256: 0 is Dijkstra's search, `UNIT` A*, and with more a route costs
+        at most weight / 256 times the least.
     labels : ndarray of int64, shape (cells, 2)
         Per cell the cost so far and a mark: 32 * query + 16 if closed + the bit of the move that
         led here (or `ROOT`). Marks below 32 * query are of earlier queries, so nothing needs
@@ -71,7 +91,7 @@ def advance(
     query : int
         Number of this query, from 1.
     heap : ndarray of int64, shape (room, 2)
-        Keyed by f = g + h; ties go to the smaller h, that is, to the larger g.
+        Keyed by f = g + weight · h; ties go to the smaller h, that is, to the larger g.
     state : ndarray of int64, shape (4,)
         Heap size, best total cost, its target, number of expanded nodes.
 
@@ -104,10 +124,10 @@ def advance(
         for k in range(8):
             if (allowed >> k) & 1:
                 to = node + ROWS[k] * width + COLS[k]
-                reached = cost + (DIAGONAL if k & 1 else ONE)
+                reached = cost + steps[k & 1, int(costs[node]) + int(costs[to])]
                 if labels[to, 1] < fresh or reached < labels[to, 0]:
                     labels[to, 0], labels[to, 1] = reached, fresh + k
-                    h = estimate(row + ROWS[k], col + COLS[k], targets)
+                    h = inflated(estimate(row + ROWS[k], col + COLS[k], targets), weight)
                     if on_top:
                         replace_top(heap, size, reached + h, h, to)
                         on_top = False

@@ -11,7 +11,8 @@ from scipy.ndimage import label
 
 from groundmap.arrays import Bools
 from groundmap.errors import InputError
-from groundmap.io.map_images import BlockedMap, read_movingai_map, read_ros_map
+from groundmap.io.map_images import BlockedMap, read_ros_map
+from groundmap.io.movingai import read_movingai_map
 from groundmap.simulate.world import World
 from groundmap.simulate.worlds.base import Box, BuiltWorld, check_bounds
 

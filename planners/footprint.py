@@ -1,0 +1,132 @@
+"""The shape of a robot on the ground: a disc, or a polygon that turns with it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+from groundmap.arrays import Floats
+from planners.errors import ProblemError
+
+EXPECTED = "a radius of 0 or more [m], or 3 or more points x, y [m, base_link] of a simple polygon"
+FLAT = 1e-12  # area, as a share of the squared extent, below which a polygon is a line
+
+
+@dataclass(frozen=True, eq=False)
+class Footprint:
+    """What a robot covers of the ground.
+
+    Attributes
+    ----------
+    polygon : ndarray, shape (n, 2) [m, base_link], or None
+        Corners, counter-clockwise, the first not repeated at the end; None for a disc.
+    radius : float [m]
+        Of the smallest disc about base_link's origin that holds all of it.
+    inscribed_radius : float [m]
+        Of the largest disc about base_link's origin that lies within; 0 if the origin doesn't.
+
+    Examples
+    --------
+    >>> car = Footprint.of([(-0.5, -0.4), (1.5, -0.4), (1.5, 0.4), (-0.5, 0.4)])
+    >>> round(car.radius, 3), car.inscribed_radius, car.width, car.is_disc
+    (1.552, 0.4, 0.8, False)
+    >>> Footprint.of(0.9).width
+    1.8
+    >>> Footprint.of([(0, 0), (1, 1), (1, 0), (0, 1)])
+    Traceback (most recent call last):
+        ...
+    planners.errors.ProblemError: footprint: expected a radius of 0 or more [m], or 3 or more \
+points x, y [m, base_link] of a simple polygon, got one that meets itself at (0.5, 0.5).
+    """
+
+    polygon: Floats | None
+    radius: float
+    inscribed_radius: float
+
+    @classmethod
+    def of(cls, value: float | npt.ArrayLike) -> Footprint:
+        """Return the footprint of a radius [m] or of a polygon's corners [m, base_link].
+
+        A repetition of the first corner at the end is dropped, and a clockwise polygon turned.
+
+        Raises
+        ------
+        ProblemError
+            Not numbers, not finite, a negative radius, fewer than 3 points, no area, or an
+            outline that meets itself.
+        """
+        try:
+            array = np.asarray(value, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise _refusal(repr(value)[:60]) from error
+        if not np.isfinite(array).all():
+            raise _refusal("a number that is not finite" if array.ndim else repr(value))
+        return cls._of_radius(float(array)) if array.ndim == 0 else cls._of_polygon(array)
+
+    @classmethod
+    def _of_radius(cls, radius: float) -> Footprint:
+        if radius < 0:
+            raise _refusal(repr(radius))
+        return cls(None, radius, radius)
+
+    @classmethod
+    def _of_polygon(cls, points: Floats) -> Footprint:
+        corners = _corners(points)
+        ring = shapely.LinearRing(corners)
+        within = shapely.Polygon(ring).contains(shapely.Point(0.0, 0.0))
+        inscribed = float(ring.distance(shapely.Point(0.0, 0.0))) if within else 0.0
+        corners.flags.writeable = False
+        return cls(corners, float(np.hypot(*corners.T).max()), inscribed)
+
+    @property
+    def is_disc(self) -> bool:
+        """Whether it is a disc about base_link's origin, which looks the same at every yaw."""
+        return self.polygon is None
+
+    @property
+    def width(self) -> float:
+        """Width of the narrowest straight way that it can be moved along [m].
+
+        Of a disc, its diameter; of a polygon, the extent across the direction in which it is
+        narrowest, whatever its kinematics. No convex shape passes a narrower gap.
+        """
+        if self.polygon is None:
+            return 2.0 * self.radius
+        hull = shapely.get_coordinates(shapely.MultiPoint(self.polygon).convex_hull)
+        sides = np.diff(hull, axis=0)  # the narrowest extent is across one of the hull's sides
+        normals = np.column_stack([-sides[:, 1], sides[:, 0]]) / np.hypot(*sides.T)[:, None]
+        return float(np.ptp(normals @ hull.T, axis=1).min())
+
+    def to_value(self) -> float | list[list[float]]:
+        """Return what `of` takes, as plain numbers, for files."""
+        if self.polygon is None:
+            return self.radius
+        corners: list[list[float]] = self.polygon.tolist()
+        return corners
+
+
+def _corners(points: Floats) -> Floats:
+    """Return the corners of a simple polygon, counter-clockwise, each of them once."""
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise _refusal(f"shape {points.shape}")
+    corners = points[(points != np.roll(points, -1, axis=0)).any(axis=1)]
+    if len(corners) < 3:
+        raise _refusal(f"{len(corners)} different points")
+    extent = float(np.ptp(corners, axis=0).max())
+    if shapely.MultiPoint(corners).convex_hull.area <= FLAT * extent * extent:
+        raise _refusal("points on one line")
+    polygon = shapely.Polygon(corners)
+    if not shapely.is_valid(polygon):
+        where = re.search(r"\[(\S+) (\S+)\]", str(shapely.is_valid_reason(polygon)))
+        at = f" at ({float(where[1]):g}, {float(where[2]):g})" if where else ""
+        raise _refusal(f"one that meets itself{at}")
+    turned: Floats = corners if shapely.is_ccw(polygon.exterior) else corners[::-1]
+    return turned.copy()
+
+
+def _refusal(got: str) -> ProblemError:
+    return ProblemError("footprint", EXPECTED, got)

@@ -1,0 +1,107 @@
+"""Exact distances from cell centres to the nearest blocked square.
+
+In half cells, a centre is at (2 col + 1, 2 row + 1) and a square spans two units, so squared
+distances are integers. The transform is separable: down a column, the nearest blocked square is k
+rows away, 2 k - 1 half cells (0 if it is the cell itself); along a row, a square to the left is
+nearest at its right border, one to the right at its left border. A column's border therefore
+carries the smaller of its two columns' squares, and what remains is the lower envelope of
+parabolas of Felzenszwalb and Huttenlocher (2012), over integers.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from groundmap.arrays import Bools, Ints, Ints32
+
+NOWHERE = np.iinfo(np.int32).max  # squared distance to a blocked square if there is none
+
+
+@njit(cache=True, nogil=True)
+def squared_distances(blocked: Bools, cap: int) -> Ints32:
+    """Return the squared distance of every cell centre to the nearest blocked square.
+
+    Parameters
+    ----------
+    blocked : ndarray of bool, shape (rows, cols)
+    cap : int [(half cells)²]
+        Larger ones are cut to this; at most `NOWHERE`.
+
+    Returns
+    -------
+    ndarray of int32, shape (rows, cols) [(half cells)²]
+    """
+    rows, cols = blocked.shape
+    squared = np.empty((rows, cols), dtype=np.int32)
+    vertical = _down_columns(blocked)
+    room = cols + 1
+    border, at = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
+    starts = np.empty(room, dtype=np.int64)
+    for row in range(rows):
+        size = _envelope(vertical[row], border, at, starts)
+        k = 0
+        for col in range(cols):
+            x = 2 * col + 1
+            least = vertical[row, col]
+            if size > 0:
+                while k + 1 < size and starts[k + 1] <= x:
+                    k += 1
+                away = x - at[k]
+                least = min(least, away * away + border[k])
+            squared[row, col] = min(least, cap)
+    return squared
+
+
+@njit(cache=True, nogil=True)
+def _down_columns(blocked: Bools) -> Ints:
+    """Return the squared vertical distance to the nearest blocked square of the same column."""
+    rows, cols = blocked.shape
+    far = rows + 1
+    steps = np.empty((rows, cols), dtype=np.int64)
+    for row in range(rows):
+        for col in range(cols):
+            if blocked[row, col]:
+                steps[row, col] = 0
+            else:
+                steps[row, col] = steps[row - 1, col] + 1 if row > 0 else far
+    for row in range(rows - 1, -1, -1):
+        for col in range(cols):
+            if row + 1 < rows:
+                steps[row, col] = min(steps[row, col], steps[row + 1, col] + 1)
+    for row in range(rows):
+        for col in range(cols):
+            k = steps[row, col]
+            if k >= far:
+                steps[row, col] = NOWHERE
+            elif k > 0:
+                steps[row, col] = (2 * k - 1) ** 2
+    return steps
+
+
+@njit(cache=True, nogil=True)
+def _envelope(vertical: Ints, border: Ints, at: Ints, starts: Ints) -> int:
+    """Write the lower envelope of the borders' parabolas and return how many it has.
+
+    Parabola k is ``(x - at[k])² + border[k]``, the lowest from ``starts[k]`` on.
+    """
+    cols, size = len(vertical), 0
+    for b in range(cols + 1):
+        height = NOWHERE
+        if b > 0:
+            height = vertical[b - 1]
+        if b < cols:
+            height = min(height, vertical[b])
+        if height >= NOWHERE:
+            continue
+        position, start = 2 * b, 0
+        while size > 0:
+            # The first integer x at which the new parabola is lower than the last one.
+            rise = height - border[size - 1] + position * position - at[size - 1] * at[size - 1]
+            start = rise // (2 * (position - at[size - 1])) + 1
+            if start > starts[size - 1]:
+                break
+            size -= 1
+        border[size], at[size], starts[size] = height, position, start if size > 0 else 0
+        size += 1
+    return size

@@ -1,0 +1,99 @@
+"""What the cells of a window are to a problem: blocked, how far from that, how dear."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from groundmap.arrays import Bools, Bytes, Floats, Ints32
+from groundmap.window import CellState, GridWindow
+from planners.costs import (
+    INSCRIBED_INFLATED_OBSTACLE,
+    LETHAL_OBSTACLE,
+    NO_INFORMATION,
+    cell_costs,
+)
+from planners.errors import ProblemError
+from planners.kernels.distance import NOWHERE, squared_distances
+from planners.lattice import squared_need
+from planners.problem import PlanningProblem
+
+MOST_CELLS = 2**25  # of a costmap: what is held of it takes about 50 bytes for each
+
+
+class Layers(NamedTuple):
+    """Arrays of shape (rows, cols), described at `planners.costmap.Costmap`."""
+
+    blocked: Bools
+    nonfree: Bools
+    cleared: Bools
+    squared: Ints32
+    costs: Bytes
+
+
+def layers_of(problem: PlanningProblem, window: GridWindow) -> Layers:
+    """Return the layers of a window; what lies outside it counts as not blocked."""
+    states = window.states(epsilon=problem.epsilon)
+    nonfree = states == CellState.NONFREE
+    cleared = _near_start(problem, window) & (states == CellState.UNKNOWN)
+    free = (states == CellState.FREE) | cleared
+    blocked = ~free if problem.avoids_unknown else nonfree
+    squared = squared_distances(blocked, cap(problem))
+    costs = cell_costs(
+        problem.costs,
+        metres(squared, window.resolution),
+        window.confidence,
+        free,
+        radius=problem.radius,
+        penalise=problem.unknown == "penalise",
+    )
+    costs[squared < squared_need(problem.radius, window.resolution)] = INSCRIBED_INFLATED_OBSTACLE
+    costs[blocked] = NO_INFORMATION
+    costs[nonfree] = LETHAL_OBSTACLE
+    return Layers(blocked, nonfree, cleared, squared, costs)
+
+
+def cap(problem: PlanningProblem) -> int:
+    """Return the squared distance beyond which nothing changes [(half cells)²]."""
+    farthest = max(problem.radius, problem.costs.reach)
+    return min(squared_need(farthest, problem.grid.resolution), NOWHERE)
+
+
+def metres(squared: Ints32, resolution: float) -> Floats:
+    """Return distances [m] of squared ones in half cells."""
+    return np.where(squared == NOWHERE, np.inf, np.sqrt(squared) * (resolution / 2.0))
+
+
+def padded_window(problem: PlanningProblem) -> GridWindow:
+    """Return the touched tiles, the cleared start, and a ring of cells around them."""
+    grid = problem.grid
+    bounds = grid.bounds()
+    if problem.clear_start:
+        start = np.array(problem.start_xy)
+        bounds[:2] = np.minimum(bounds[:2], start - problem.clear_radius)
+        bounds[2:] = np.maximum(bounds[2:], start + problem.clear_radius)
+    # One cell and a half: borders that rounding moves by a cell must not swallow the ring.
+    ring = 1.5 * grid.resolution * np.array([-1, -1, 1, 1])
+    cells = float(np.prod((bounds[2:] - bounds[:2]) / grid.resolution))
+    if cells > MOST_CELLS:
+        raise ProblemError(
+            "footprint",
+            f"one that leaves {MOST_CELLS} cells of map and cleared start at most",
+            f"radius {problem.radius:g} m, which makes {cells:.3g}",
+            hint="Give a smaller footprint or clear_start_radius, or map with larger cells.",
+        )
+    return grid.window(bounds + ring)
+
+
+def _near_start(problem: PlanningProblem, window: GridWindow) -> Bools:
+    """Return which cells' squares come within the clear radius of the start."""
+    if not problem.clear_start:
+        return np.zeros(window.count.shape, dtype=np.bool_)
+    rows, cols = window.count.shape
+    x, y = (np.array(problem.start_xy) - window.origin) / window.resolution
+    col, row = np.arange(cols), np.arange(rows)
+    dx = np.maximum(np.maximum(col - x, x - col - 1), 0.0)
+    dy = np.maximum(np.maximum(row - y, y - row - 1), 0.0)
+    near: Bools = np.hypot(dx, dy[:, None]) * window.resolution <= problem.clear_radius
+    return near
