@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from groundmap.arrays import Floats
+from groundmap.arrays import Floats, Ints
 from groundmap.camera import StereoRig
 from groundmap.evidence import Evidence, drop_off_cells, evidence_of
 from groundmap.features import View
@@ -87,9 +87,14 @@ class GroundMapper:
         )
         self.stats = MapperStats()
         self.stages = stages or Stages()
+        #: Cells of the grid that the last view changed, [row, col], shape (n, 2): what a planner
+        #: that replans as the map grows has to look at.
+        self.changed: Ints = np.empty((0, 2), dtype=np.int64)
 
     def integrate(self, view: View) -> None:
         """Add one view to the grid; a view that is refused leaves the grid as it was.
+
+        `changed` then holds the cells that the view changed.
 
         Parameters
         ----------
@@ -103,8 +108,11 @@ class GroundMapper:
         """
         parts = self.explain(view)
         with self.stages.timed("fuse"):
-            self.grid.fuse(parts.evidence.lower, parts.evidence.z)
-            self.grid.add_drop_offs(drop_off_cells(parts.flat, self.grid))
+            lower, z = parts.evidence.lower, parts.evidence.z
+            drop_offs = drop_off_cells(parts.flat, self.grid)
+            self.grid.fuse(lower, z)
+            self.grid.add_drop_offs(drop_offs)
+            self.changed = np.concatenate([np.argwhere(z) + lower, drop_offs])
             self.grid.trajectory = np.concatenate([self.grid.trajectory, _pose2d(view)])
         self.stats.views += 1
         self.stats.features_used += parts.flat.used

@@ -8,9 +8,10 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from groundmap.arrays import Bools
+from groundmap.arrays import Bools, Floats32
 from oracles_planning import (
     BLOCKED,
+    FREE,
     UNSEEN,
     drawing,
     free_field,
@@ -19,11 +20,13 @@ from oracles_planning import (
     move_allowed,
     union_of_squares,
 )
-from planners import PlanningProblem
+from planners import CostSettings, PlanningProblem
 from planners.costmap import Costmap
 from planners.kernels.astar import COLS, ROWS
 from planners.kernels.distance import NOWHERE, squared_distances
 from planners.lattice import allowed_moves, squared_clearance, squared_need
+from planners.problem import Unknown
+
 
 def standing(blocked: Bools, radius: float) -> Bools:
     """Return the cells on whose centre a disc fits."""
@@ -146,3 +149,63 @@ def test_allowing_unknown_space_leaves_nonfree_cells_blocked() -> None:
     grid = grid_of(drawing("?#. ... ..?"))
     problem = PlanningProblem(grid, start=(0, 0), goal=(2, 2), footprint=0.0, unknown="allow")
     assert Costmap.of(problem).blocked.sum() == 1
+
+
+@st.composite
+def edits(draw: st.DrawFn) -> tuple[Floats32, list[tuple[int, int, float]]]:
+    """Draw evidence of 64 x 64 cells and what later views say of some of its cells."""
+    seed = draw(st.integers(0, 2**16))
+    rng = np.random.default_rng(seed)
+    z = rng.choice([FREE, FREE, FREE, BLOCKED, UNSEEN], size=(64, 64)).astype(np.float32)
+    cells = st.tuples(st.integers(0, 63), st.integers(0, 63), st.sampled_from([FREE, BLOCKED]))
+    return z, draw(st.lists(cells, min_size=1, max_size=5))
+
+
+@given(edits(), st.sampled_from([0.0, 0.6, 1.7]), st.sampled_from(["avoid", "penalise"]))
+@settings(max_examples=30, deadline=None)
+def test_an_updated_costmap_is_the_one_made_from_scratch(
+    drawn: tuple[Floats32, list[tuple[int, int, float]]], radius: float, unknown: Unknown
+) -> None:
+    z, changes = drawn
+    grid = grid_of(z)
+    costs = CostSettings(clearance_weight=1.5, confidence_weight=1.0, inflation_radius=2.5)
+    problem = PlanningProblem(
+        grid, start=(9, 9), goal=(50, 50), footprint=radius, unknown=unknown, costs=costs
+    )
+    costmap = Costmap.of(problem)
+    for row, col, value in changes:
+        grid.fuse(np.array([row, col]), np.full((1, 1), value, dtype=np.float32))
+        grid.fuse(np.array([row, col]), np.full((1, 1), value, dtype=np.float32))
+    updated = costmap.updated([change[:2] for change in changes])
+    for name in ("blocked", "nonfree", "cleared", "squared", "costs"):
+        np.testing.assert_array_equal(
+            getattr(updated, name), getattr(Costmap.of(problem), name), err_msg=name
+        )
+    np.testing.assert_array_equal(
+        updated.window.confidence,
+        grid.window(
+            np.concatenate(
+                [
+                    updated.window.origin + 0.5,
+                    updated.window.origin + np.array(updated.blocked.shape)[::-1] - 0.5,
+                ]
+            )
+        ).confidence,
+    )
+
+
+def test_a_map_that_grew_is_looked_at_as_a_whole() -> None:
+    grid = grid_of(free_field(64, 64))
+    problem = PlanningProblem(grid, start=(9, 9), goal=(50, 50), footprint=1.0)
+    costmap = Costmap.of(problem)
+    grid.fuse(np.array([10, 70]), free_field(4, 4))
+    updated = costmap.updated([(10, 70), (13, 73)])
+    assert updated.blocked.shape == (68, 132)
+    np.testing.assert_array_equal(updated.blocked, Costmap.of(problem).blocked)
+
+
+def test_nothing_changed_changes_nothing() -> None:
+    costmap = Costmap.of(
+        PlanningProblem(grid_of(free_field(9, 9)), start=(2, 2), goal=(5, 5), footprint=1.0)
+    )
+    assert costmap.updated(np.empty((0, 2), dtype=np.int64)) is costmap

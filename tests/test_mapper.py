@@ -236,6 +236,18 @@ def test_explaining_a_view_changes_nothing() -> None:
     assert mapper.stats.features_used == before.stats["features_used"] + parts.flat.used
 
 
+def test_the_mapper_names_the_cells_that_a_view_changed() -> None:
+    rng = np.random.default_rng(9)
+    mapper = mapped([room_view(rng)])
+    window = mapper.grid.window()
+    mapper.integrate(room_view(rng))
+    again = mapper.grid.window()
+    assert again.count.shape == window.count.shape
+    spoken = (again.count != window.count) | (again.drop_offs != window.drop_offs)
+    expected = np.argwhere(spoken) + mapper.grid.cell_bounds()[0]
+    assert {*map(tuple, mapper.changed.tolist())} == {*map(tuple, expected.tolist())}
+
+
 def test_features_are_smoothed_before_they_are_linked() -> None:
     rng = np.random.default_rng(7)
     wall = np.column_stack([np.full(60, 6.0), np.linspace(-1.5, 1.5, 60), np.full(60, 0.7)])
