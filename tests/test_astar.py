@@ -8,20 +8,25 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
 
 from groundmap.arrays import Bools, Floats
 from groundmap.errors import SettingsError
 from oracles_planning import BLOCKED, FREE, drawing, free_field, grid_of, masks, shortest_lengths
 from planners import (
     AStarSettings,
+    CostSettings,
     EnclosedError,
     NoRouteError,
     PlanningProblem,
     TimeLimitError,
     plan,
 )
-from planners.astar import AStar, Found
+from planners.astar import AStar
 from planners.costmap import Costmap
+from planners.engine import Found
+from planners.kernels.astar import COLS, ROWS
 
 RADII = [0.0, 0.4, 0.5, math.sqrt(0.5), 1.0]
 places = st.tuples(st.floats(0, 9), st.floats(0, 9))
@@ -173,3 +178,81 @@ def test_waypoints_turn_at_every_inner_point() -> None:
     steps /= np.hypot(*steps.T)[:, None]
     turns = steps[:-1, 0] * steps[1:, 1] - steps[:-1, 1] * steps[1:, 0]
     assert (np.abs(turns) > 1e-6).all()
+
+
+def dear_problem(seed: int, goal: tuple[float, float] = (29.5, 29.5)) -> PlanningProblem:
+    """Return a problem on a map whose cells differ in confidence."""
+    rng = np.random.default_rng(seed)
+    z = np.where(rng.random((32, 32)) < 0.2, BLOCKED, -rng.uniform(0.05, 1.0, (32, 32)))
+    z[1, 1] = z[29, 29] = FREE
+    return PlanningProblem(
+        grid_of(z),
+        start=(1.5, 1.5),
+        goal=goal,
+        footprint=0.0,
+        clear_start=False,
+        costs=CostSettings(confidence_weight=4.0, clearance_weight=2.0),
+    )
+
+
+def dijkstra_cost(costmap: Costmap) -> float:
+    """Return the least cost between the cells of start and goal, by SciPy [cells]."""
+    extra = np.where(costmap.stand, costmap.costs, 0) * (costmap.top / 252)
+    index = np.arange(costmap.blocked.size).reshape(costmap.blocked.shape)
+    edges = []
+    for k in range(8):
+        for a in np.argwhere(costmap.moves >> k & 1):
+            b = a + np.array([ROWS[k], COLS[k]])
+            factor = 1 + (extra[tuple(a)] + extra[tuple(b)]) / 2
+            edges.append((index[tuple(a)], index[tuple(b)], (1, math.sqrt(2))[k & 1] * factor))
+    tails, heads, costs = np.array(edges).T
+    graph = coo_array((costs, (tails.astype(int), heads.astype(int))), shape=(index.size,) * 2)
+    start, goal = costmap.window.world_to_cell([(1.5, 1.5), costmap.problem.goal_xy])
+    return float(dijkstra(graph.tocsr(), indices=index[tuple(start)])[index[tuple(goal)]])
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("planner", ["astar", "dijkstra"])
+def test_dear_cells_are_weighed_as_on_the_oracles_graph(seed: int, planner: str) -> None:
+    problem = dear_problem(seed)
+    expected = dijkstra_cost(Costmap.of(problem))
+    if np.isinf(expected):
+        with pytest.raises(EnclosedError, match="no route"):
+            plan(problem, planner)
+    else:
+        route = plan(problem, planner)
+        assert route.cost == pytest.approx(expected, rel=1e-6)
+        assert route.cost > route.length
+        assert route.bound == 1.0
+
+
+def test_the_estimate_saves_work_and_dijkstras_search_has_none() -> None:
+    problem = dear_problem(1, goal=(15.5, 9.5))
+    assert plan(problem, "astar").expanded < plan(problem, "dijkstra").expanded
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("weight", [1.0, 1.2, 2.5, 10.0])
+def test_weighted_astar_keeps_its_bound(seed: int, weight: float) -> None:
+    problem = dear_problem(seed)
+    try:
+        best = plan(problem)
+    except EnclosedError:
+        with pytest.raises(EnclosedError, match="no route"):
+            plan(problem, "weighted_astar", weight=weight)
+        return
+    route = plan(problem, "weighted_astar", weight=weight)
+    assert route.bound is not None
+    assert best.cost <= route.cost + 1e-9 <= route.bound * best.cost + 2e-9
+    assert weight - 1 / 256 <= route.bound <= weight
+
+
+def test_weighted_astar_expands_less_where_the_way_is_open() -> None:
+    grid = grid_of(np.where(mazes(2, share=0.1), BLOCKED, FREE))
+    problem = PlanningProblem(grid, start=(1.5, 1.5), goal=(68.5, 60.5), footprint=0.0)
+    assert plan(problem, "weighted_astar", weight=3).expanded < plan(problem).expanded / 2
+
+
+def test_a_weight_below_one_is_refused() -> None:
+    with pytest.raises(SettingsError, match="weight: expected greater than or equal to 1"):
+        plan(dear_problem(0), "weighted_astar", weight=0.5)

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from groundmap.arrays import Floats
 from groundmap.grid import ConfidenceGrid
 from oracles_planning import BLOCKED, FREE, UNSEEN, free_field, grid_of
 from planners import AuditError, NoRouteError, PlanningProblem, Route, plan
@@ -108,3 +109,65 @@ def test_unknown_cells_near_the_start_are_passed_and_others_are_not() -> None:
             ),
             leaving,
         )
+
+
+CAR = [(-0.5, -0.6), (2.5, -0.6), (2.5, 0.6), (-0.5, 0.6)]
+HOOK = [(-0.5, -0.5), (2.5, -0.5), (2.5, 0.5), (1.5, 0.5), (1.5, -0.2), (-0.5, -0.2)]
+
+
+def car_problem(outline: list[tuple[float, float]], **ends: object) -> PlanningProblem:
+    z = free_field(64, 64)
+    z[30, 30] = BLOCKED  # x and y from 30 to 31
+    asked = {"start": (20.0, 29.3, 0.0), "goal": (40.0, 29.3, 0.0)} | ends
+    return PlanningProblem(grid_of(z), footprint=outline, **asked)  # type: ignore[arg-type]
+
+
+def drive(ys: float, *, turn: float = 0.0) -> tuple[Floats, Floats]:
+    """Return poses along y = `ys`, turned by `turn` in the middle."""
+    x = np.linspace(20.0, 40.0, 201)
+    middle = np.exp(-(((x - 29.0) / 3.0) ** 2))
+    middle[[0, -1]] = 0.0
+    return np.column_stack([x, np.full_like(x, ys)]), turn * middle
+
+
+def test_an_outline_may_pass_where_its_disc_may_not() -> None:
+    problem = car_problem(CAR)
+    waypoints, headings = drive(29.3)
+    audit(problem, waypoints, headings=headings)
+    with pytest.raises(AuditError, match="comes too near to a nonfree cell"):
+        audit(problem, waypoints)
+
+
+def test_an_outline_may_touch_a_square_and_not_enter_it() -> None:
+    ends = {"start": (20.0, 29.4, 0.0), "goal": (40.0, 29.4, 0.0)}
+    waypoints, headings = drive(29.4)
+    audit(car_problem(CAR, **ends), waypoints, headings=headings)
+    low = {"start": (20.0, 29.4 + 1e-6, 0.0), "goal": (40.0, 29.4 + 1e-6, 0.0)}
+    with pytest.raises(AuditError, match=r"sweeps a nonfree cell at \(3\d\.\d\d, 30\.00\)"):
+        audit(car_problem(CAR, **low), waypoints + np.array([0, 1e-6]), headings=headings)
+
+
+def test_an_outline_that_turns_into_an_obstacle_is_refused() -> None:
+    waypoints, headings = drive(29.3, turn=0.3)
+    with pytest.raises(AuditError, match="sweeps a nonfree cell"):
+        audit(car_problem(CAR), waypoints, headings=headings)
+
+
+@pytest.mark.parametrize(("y", "clear"), [(30.15, True), (30.25, False)])
+def test_the_hollow_of_an_outline_is_not_part_of_it(y: float, clear: bool) -> None:
+    problem = car_problem(HOOK, start=(30.25, 20.0, 0.0), goal=(30.25, y, 0.0))
+    up = np.column_stack([np.full(50, 30.25), np.linspace(20.0, y, 50)])
+    if clear:
+        audit(problem, up, headings=np.zeros(50))
+    else:
+        with pytest.raises(AuditError, match="sweeps a nonfree cell"):
+            audit(problem, up, headings=np.zeros(50))
+
+
+def test_a_route_that_misses_a_yaw_is_refused() -> None:
+    waypoints, headings = drive(25.0)
+    ends = {"start": (20.0, 25.0, 0.0), "goal": (40.0, 25.0, 0.1)}
+    with pytest.raises(AuditError, match=r"misses the yaw of the goal .* got 0\.1"):
+        audit(car_problem(CAR, **ends), waypoints, headings=headings)
+    whole_turn = {"start": (20.0, 25.0, 2 * np.pi), "goal": (40.0, 25.0, -2 * np.pi)}
+    audit(car_problem(CAR, **whole_turn), waypoints, headings=headings)

@@ -10,17 +10,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from groundmap.arrays import Floats
+from groundmap.errors import InputError
 from oracles_planning import BLOCKED, UNSEEN, free_field, grid_of
 from planners import PlanningProblem, Route, plan
 from planners.polyline import crossed, merged
 
 KEYS = {
     "length",
+    "cost",
+    "bound",
+    "headings",
     "min_clearance",
     "min_confidence",
     "mean_confidence",
@@ -132,3 +137,41 @@ def test_merging_keeps_the_line_and_its_ends(line: Floats) -> None:
     assert new.length == pytest.approx(old.length, abs=1e-8)
     if new.length > 1e-6:
         assert shapely.hausdorff_distance(old, new) < 1e-8
+
+
+def test_headings_follow_the_line_and_end_in_the_yaw_asked_for() -> None:
+    route = straight(goal=(20.5, 18.5))
+    assert route.headings.tolist() == [math.pi / 4] * 2
+    turned = straight(goal=(20.5, 18.5, -1.0))
+    assert turned.headings.tolist() == [math.pi / 4, -1.0]
+
+
+def test_a_csv_has_a_line_for_each_waypoint(tmp_path: Path) -> None:
+    route = straight(goal=(30.5, 18.5))
+    route.save(tmp_path / "route.csv")
+    lines = (tmp_path / "route.csv").read_text().splitlines()
+    assert lines[0] == "x,y,yaw,distance"
+    table = np.loadtxt(lines[1:], delimiter=",")
+    np.testing.assert_array_equal(table[:, :2], route.waypoints)
+    np.testing.assert_array_equal(table[:, 2], route.headings)
+    assert table[-1, 3] == pytest.approx(route.length)
+
+
+def test_a_path_message_has_a_pose_for_each_waypoint(tmp_path: Path) -> None:
+    route = straight(goal=(30.5, 18.5))
+    route.save(tmp_path / "route.yaml")
+    message = yaml.safe_load((tmp_path / "route.yaml").read_text())
+    assert message == route.to_path()
+    assert message["header"]["frame_id"] == "map"
+    for pose, (x, y), yaw in zip(message["poses"], route.waypoints, route.headings, strict=True):
+        assert (pose["pose"]["position"]["x"], pose["pose"]["position"]["y"]) == (x, y)
+        turn = pose["pose"]["orientation"]
+        assert 2 * math.atan2(turn["z"], turn["w"]) == pytest.approx(yaw)
+
+
+def test_a_route_is_saved_as_its_name_ends_or_not_at_all(tmp_path: Path) -> None:
+    straight().save(tmp_path / "route.geojson")
+    assert json.loads((tmp_path / "route.geojson").read_text())["type"] == "Feature"
+    with pytest.raises(InputError, match=r"path: expected a name that ends in \.geojson or"):
+        straight().save(tmp_path / "route.txt")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["route.geojson"]
