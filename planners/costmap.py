@@ -172,6 +172,11 @@ class Costmap:
         """Return where the centre of a disc of another radius [m] may be, shape (rows, cols)."""
         return ~self.blocked & (self.all_squared >= squared_need(radius, self.window.resolution))
 
+    def clearance_at(self, cells: Ints) -> Floats:
+        """Return the clearance of cell centres [row, col], shape (n,) [m]."""
+        at: Floats = self.clearance[tuple(cells.T)]
+        return at
+
     def to_cells(self, points: npt.ArrayLike) -> Floats:
         """Return positions [m, map] in cells from the window's outer corner, shape (n, 2)."""
         shifted: Floats = np.atleast_2d(np.asarray(points, dtype=np.float64)) - self.window.origin

@@ -15,7 +15,7 @@ SAME = 1e-10  # [m] inner points that near their predecessor are the same point,
 class Crossed(NamedTuple):
     """The cells a line crosses, in order; a cell may come more than once."""
 
-    cells: Ints  #: shape (n, 2): row, column
+    cells: Ints  #: shape (n, d): row, column (in 3-D: layer, row, column)
     lengths: Floats  #: shape (n,): length of the line inside [cells]
 
 
@@ -33,6 +33,29 @@ def length_of(points: Floats) -> float:
     """
     steps = np.diff(points, axis=0)
     return float(np.sqrt((steps * steps).sum(axis=1)).sum())
+
+
+def distances_to(points: Floats, line: Floats) -> Floats:
+    """Return the distances of points to a polyline, shape (n,).
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, d)
+    line : ndarray, shape (m, d), m >= 2
+
+    Examples
+    --------
+    >>> distances_to(np.array([[1.0, 2.0], [5.0, 0.0]]), np.array([[0.0, 0.0], [3.0, 0.0]]))
+    array([2., 2.])
+    """
+    nearest = np.full(len(points), np.inf)
+    for a, b in pairwise(line):
+        along = b - a
+        squared = float(along @ along)
+        t = (points - a) @ along / squared if squared > 0 else np.zeros(len(points))
+        feet = a + np.clip(t, 0.0, 1.0)[:, None] * along
+        nearest = np.minimum(nearest, np.linalg.norm(points - feet, axis=1))
+    return nearest
 
 
 def merged(points: Floats) -> Floats:
@@ -84,7 +107,7 @@ def crossed(points: Floats) -> Crossed:
 
     Parameters
     ----------
-    points : ndarray, shape (n, 2) [cells]
+    points : ndarray, shape (n, d) [cells]
 
     Examples
     --------
@@ -112,4 +135,4 @@ def _crossed_piece(a: Floats, b: Floats) -> Crossed:
     t = np.unique(np.concatenate(cuts))
     middles = a + ((t[:-1] + t[1:]) / 2.0)[:, None] * (b - a)
     cells = np.floor(middles).astype(np.int64)[:, ::-1]
-    return Crossed(cells, np.diff(t) * np.hypot(*(b - a)))
+    return Crossed(cells, np.diff(t) * np.linalg.norm(b - a))

@@ -11,16 +11,15 @@ from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
-import shapely
 import yaml
 
 from groundmap.archive import write_atomically
 from groundmap.arrays import Floats
 from groundmap.errors import InputError
-from planners.costmap import Costmap
 from planners.engine import Found
-from planners.polyline import Crossed, crossed, length_of
+from planners.polyline import Crossed, crossed, distances_to, length_of
 from planners.problem import PlanningProblem
+from planners.space import Space
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +29,8 @@ class Route:
     Attributes
     ----------
     waypoints : ndarray, shape (n, 2), n >= 2 [m, map]
-        Start, turning points, goal; exactly collinear points are merged.
+        Start, turning points, goal; exactly collinear points are merged. On a 3-D map of shape
+        (n, 3).
     headings : ndarray, shape (n,) [rad, map]
         Where the robot looks at each waypoint: as the planner decided, else along the next piece
         (at the goal: the yaw asked for, or along the last piece).
@@ -50,7 +50,7 @@ class Route:
         unknown. Of the least sure cell that the line crosses; mean along the line.
     unknown_length : float [m]
         Length of the line in cells of which nothing is known.
-    start_unknown_area : float [m²]
+    start_unknown_area : float [m²; on a 3-D map m³]
         Area of the unknown cells that counted as free because they are near the start and that
         the route really uses: their centre comes under the footprint, or the line crosses them.
     planner : str
@@ -82,39 +82,39 @@ class Route:
     audit: str = "clean"
 
     @classmethod
-    def along(cls, costmap: Costmap, found: Found, *, planner: str, seconds: float) -> Route:
-        """Return the route that a planner found, measured on the costmap.
+    def along(cls, space: Space, found: Found, *, planner: str, seconds: float) -> Route:
+        """Return the route that a planner found, measured on the map.
 
         Parameters
         ----------
-        costmap : Costmap
+        space : Costmap or Voxels
         found : Found
         planner, seconds
             As in the attributes.
         """
         waypoints = found.waypoints
-        line = crossed(costmap.to_cells(waypoints))
-        rows, cols = line.cells.T
-        sureness = -costmap.window.confidence[rows, cols].astype(np.float64)
-        unknown = costmap.window.count[rows, cols] == 0
+        line = crossed(space.to_cells(waypoints))
+        at = tuple(line.cells.T)
+        sureness = -space.window.confidence[at].astype(np.float64)
+        unknown = space.window.count[at] == 0
         length = length_of(waypoints)
         headings = found.headings
         return cls(
             waypoints=waypoints,
-            headings=_headings(waypoints, costmap.problem) if headings is None else headings,
+            headings=_headings(waypoints, space.problem) if headings is None else headings,
             length=length,
             cost=length if found.cost is None else found.cost,
             bound=found.bound,
-            min_clearance=costmap.clearance_of(waypoints),
-            mean_clearance=_mean(costmap.clearance[rows, cols], line.lengths),
+            min_clearance=space.clearance_of(waypoints),
+            mean_clearance=_mean(space.clearance_at(line.cells), line.lengths),
             min_confidence=float(sureness.min()) + 0.0,  # + 0.0: an unknown cell's -0.0 is 0.0
             mean_confidence=_mean(sureness, line.lengths) + 0.0,
-            unknown_length=float(line.lengths[unknown].sum()) * costmap.window.resolution,
-            start_unknown_area=_start_unknown_area(costmap, waypoints, line),
+            unknown_length=float(line.lengths[unknown].sum()) * space.window.resolution,
+            start_unknown_area=_start_unknown_area(space, waypoints, line),
             planner=planner,
             expanded=found.expanded,
             seconds=seconds,
-            frame=costmap.problem.grid.frame,
+            frame=space.problem.grid.frame,
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -152,20 +152,22 @@ class Route:
             {
                 "header": header,
                 "pose": {
-                    "position": {"x": x, "y": y, "z": 0.0},
+                    "position": dict(zip("xyz", [*place, 0.0], strict=False)),
                     "orientation": _quaternion(yaw),
                 },
             }
-            for (x, y), yaw in zip(self.waypoints.tolist(), self.headings.tolist(), strict=True)
+            for place, yaw in zip(self.waypoints.tolist(), self.headings.tolist(), strict=True)
         ]
         return {"header": header, "poses": poses}
 
     def to_csv(self) -> str:
-        """Return a line per waypoint: x [m], y [m], yaw [rad], distance along the route [m]."""
-        along = np.append(0.0, np.cumsum(np.hypot(*np.diff(self.waypoints, axis=0).T)))
+        """Return a line per waypoint: x, y (and z) [m], yaw [rad], distance along the route [m]."""
+        steps = np.linalg.norm(np.diff(self.waypoints, axis=0), axis=1)
+        along = np.append(0.0, np.cumsum(steps))
         table = np.column_stack([self.waypoints, self.headings, along])
         lines = [",".join(map(repr, row)) for row in table.tolist()]
-        return "\n".join(["x,y,yaw,distance", *lines, ""])
+        axes = ",".join("xyz"[: self.waypoints.shape[1]])
+        return "\n".join([f"{axes},yaw,distance", *lines, ""])
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the route to a file, all or nothing; the name's ending says how.
@@ -180,10 +182,8 @@ class Route:
         OSError
             The folder does not exist or can't be written to.
         """
-        kind = Path(path).suffix.lower()
-        if kind not in WRITERS:
-            raise InputError("path", f"a name that ends in {' or '.join(WRITERS)}", repr(str(path)))
-        _write(path, WRITERS[kind](self))
+        check_route_file(path)
+        _write(path, WRITERS[Path(path).suffix.lower()](self))
 
     def save_geojson(self, path: str | PathLike[str]) -> None:
         """Write the GeoJSON Feature to a file, all or nothing.
@@ -194,6 +194,19 @@ class Route:
             The folder does not exist or can't be written to.
         """
         _write(path, _geojson(self))
+
+
+def check_route_file(path: str | PathLike[str]) -> None:
+    """Check that a route can be written to a file of that name.
+
+    Raises
+    ------
+    InputError
+        Another ending than `WRITERS` has.
+    """
+    if Path(path).suffix.lower() not in WRITERS:
+        expected = f"a name that ends in {', '.join(WRITERS)}"
+        raise InputError("path", expected, repr(str(path)))
 
 
 def _geojson(route: Route) -> str:
@@ -221,9 +234,10 @@ def _write(path: str | PathLike[str], text: str) -> None:
 
 def _headings(waypoints: Floats, problem: PlanningProblem) -> Floats:
     """Return where a robot looks that drives along a line; standing, it looks along x."""
-    dx, dy = np.diff(waypoints, axis=0).T
+    dx, dy = np.diff(waypoints, axis=0).T[:2]
     headings = np.arctan2(dy, dx)
-    last = problem.goal[2] if len(problem.goal) > 2 else headings[-1]
+    ndim = problem.grid.ndim
+    last = problem.goal[ndim] if len(problem.goal) > ndim else headings[-1]
     return np.append(headings, last)
 
 
@@ -238,10 +252,10 @@ def _mean(values: Floats, weights: Floats) -> float:
     return float(np.average(values, weights=weights))
 
 
-def _start_unknown_area(costmap: Costmap, waypoints: Floats, line: Crossed) -> float:
-    centres = costmap.window.cell_to_world(np.argwhere(costmap.cleared))
-    distances = shapely.distance(shapely.linestrings(waypoints), shapely.points(centres))
-    used = np.zeros_like(costmap.cleared)
-    used[costmap.cleared] = distances <= costmap.radius
+def _start_unknown_area(space: Space, waypoints: Floats, line: Crossed) -> float:
+    centres = space.window.cell_to_world(np.argwhere(space.cleared))
+    used = np.zeros_like(space.cleared)
+    used[space.cleared] = distances_to(centres, waypoints) <= space.radius
     used[tuple(line.cells.T)] = True
-    return float((used & costmap.cleared).sum()) * costmap.window.resolution**2
+    cells = float((used & space.cleared).sum())
+    return cells * space.window.resolution**space.cleared.ndim

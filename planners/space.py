@@ -1,0 +1,47 @@
+"""What routes are checked and measured on, in two dimensions or three."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy.typing as npt
+
+from groundmap.arrays import Bools, Floats, Ints
+from groundmap.window import GridWindow
+from planners.problem import PlanningProblem
+
+
+class Space(Protocol):
+    """A map as a problem sees it: `planners.costmap.Costmap`, or `planners.voxels.Voxels` in 3-D."""
+
+    @property
+    def problem(self) -> PlanningProblem:
+        """What was asked."""
+        ...
+
+    @property
+    def window(self) -> GridWindow:
+        """The map's cells."""
+        ...
+
+    @property
+    def cleared(self) -> Bools:
+        """Unknown cells that count as free."""
+        ...
+
+    @property
+    def radius(self) -> float:
+        """Distance that the footprint's centre keeps from what is blocked [m]."""
+        ...
+
+    def to_cells(self, points: npt.ArrayLike) -> Floats:
+        """Return positions in cells."""
+        ...
+
+    def clearance_of(self, points: npt.ArrayLike) -> float:
+        """Return the exact distance of a polyline to what is blocked [m]."""
+        ...
+
+    def clearance_at(self, cells: Ints) -> Floats:
+        """Return the distance of cells' centres to what is blocked [m]."""
+        ...
