@@ -6,7 +6,7 @@ from groundmap.features import Features, View
 from groundmap.grid import ConfidenceGrid
 from groundmap.ground import GroundPlane
 from groundmap.ground_fit import fit_ground
-from groundmap.io import read_views, write_views
+from groundmap.io import load_map, read_views, write_views
 from groundmap.mapper import GroundMapper
 from groundmap.settings import GroundSettings, MapperSettings
 from groundmap.window import CellState, GridWindow
@@ -24,6 +24,7 @@ __all__ = [
     "StereoRig",
     "View",
     "fit_ground",
+    "load_map",
     "read_views",
     "write_views",
 ]

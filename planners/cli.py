@@ -1,4 +1,4 @@
-"""The command ``groundmap``: exit 0 done, 1 a scenario failed, 2 bad input or usage, 3 no route."""
+"""The command ``groundmap``: exit 0 done, 1 a bound missed, 2 bad input or usage, 3 no route."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import typer
 from typer.exceptions import TyperException
 
 from groundmap.errors import GroundmapError
+from planners.commands.bench import bench_app
 from planners.commands.convert import convert_command
 from planners.commands.demo import demo_command
 from planners.commands.evaluate import evaluate_command
@@ -38,6 +39,7 @@ app.command("info")(info_command)
 app.command("convert")(convert_command)
 app.command("evaluate")(evaluate_command)
 app.add_typer(scenario_app)
+app.add_typer(bench_app)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

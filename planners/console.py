@@ -16,6 +16,7 @@ from rich.progress import track
 
 T = TypeVar("T")
 
+LISTS = ("waypoints", "headings")  # of a route: in its file, not in the table for people
 SAY_EVERY = 2.0  # [s], between two lines of progress where there is no terminal
 
 JsonOption = Annotated[
@@ -28,7 +29,7 @@ def emit(result: Mapping[str, Any], *, as_json: bool, title: str) -> None:
     if as_json:
         print(json.dumps(result))
         return
-    shown = {name.replace("_", " "): _shown(result[name]) for name in result if name != "waypoints"}
+    shown = {name.replace("_", " "): _shown(result[name]) for name in result if name not in LISTS}
     width = max(map(len, shown))
     print(title, *(f"  {name:<{width}}  {value}" for name, value in shown.items()), sep="\n")
 
@@ -42,6 +43,21 @@ def emit_columns(columns: Mapping[str, Mapping[str, Any]], *, title: str) -> Non
     for key in keys:
         cells = (f"{_shown(column[key]):>10}" for column in columns.values())
         print(f"{key.replace('_', ' '):<{width}}", *cells, sep="  ")
+
+
+def emit_rows(rows: Mapping[str, Mapping[str, Any]], *, title: str) -> None:
+    """Print results for people: a row for each, a column for each of their keys."""
+    keys = list(next(iter(rows.values())))
+    heads = [key.replace("_", " ") for key in keys]
+    cells = {name: [_shown(row[key]) for key in keys] for name, row in rows.items()}
+    first = max(map(len, cells))
+    widths = [
+        max(len(head), *(len(row[i]) for row in cells.values())) for i, head in enumerate(heads)
+    ]
+    print(title)
+    for name, row in {"": heads, **cells}.items():
+        padded = (f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))
+        print(f"  {name:<{first}}", *padded, sep="  ")
 
 
 def say(message: str) -> None:

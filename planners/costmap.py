@@ -182,14 +182,17 @@ class Costmap:
         shifted: Floats = np.atleast_2d(np.asarray(points, dtype=np.float64)) - self.window.origin
         return shifted / self.window.resolution
 
-    def clearance_of(self, points: npt.ArrayLike) -> float:
+    def clearance_of(self, points: npt.ArrayLike, *, to: Bools | None = None) -> float:
         """Return the exact distance of a point or a polyline to the nearest blocked square [m].
 
         Parameters
         ----------
         points : array_like, shape (2,) or (n, 2) [m, map]
+        to : ndarray of bool, shape (rows, cols), optional
+            Other cells than the blocked ones.
         """
-        return line_clearance(self.blocked, self.to_cells(points)) * self.window.resolution
+        mask = self.blocked if to is None else to
+        return line_clearance(mask, self.to_cells(points)) * self.window.resolution
 
 
 def _slices(first: Ints, last: Ints) -> tuple[slice, slice]:

@@ -38,6 +38,11 @@ class Engine(Protocol):
 
     def __init__(self, costmap: Costmap) -> None: ...
 
+    @property
+    def name(self) -> str:
+        """Name of the planner, as in `planners.PLANNERS`."""
+        ...
+
     def search(self, start: Pose, goal: Pose, settings: Any) -> Found | None:
         """Return the best route between two places of the costmap, or None if there is none.
 

@@ -116,13 +116,13 @@ got (0, nan).
 
     @property
     def start_xy(self) -> Point:
-        """x, y of the start [m, map]."""
-        return float(self.start[0]), float(self.start[1])
+        """x, y of the start (on a 3-D map also z) [m, map]."""
+        return tuple(map(float, self.start[: self.grid.ndim]))
 
     @property
     def goal_xy(self) -> Point:
-        """x, y of the goal [m, map]."""
-        return float(self.goal[0]), float(self.goal[1])
+        """x, y of the goal (on a 3-D map also z) [m, map]."""
+        return tuple(map(float, self.goal[: self.grid.ndim]))
 
     @property
     def clear_radius(self) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import Any, NamedTuple
 
-from planners.answers import answer, costmap_of
+from planners.answers import answer, space_of
 from planners.astar import (
     AStar,
     AStarSettings,
@@ -14,11 +14,16 @@ from planners.astar import (
     WeightedAStar,
     WeightedAStarSettings,
 )
+from planners.astar3d import AStar3D
 from planners.enclosure import enclosed
+from planners.enclosure3d import enclosed_3d
 from planners.engine import Engine, SearchSettings
 from planners.errors import ProblemError
 from planners.problem import PlanningProblem
 from planners.route import Route
+from planners.voxels import Voxels
+
+SPATIAL = ("astar", "auto")  # planners that plan on 3-D maps, too
 
 
 class Planner(NamedTuple):
@@ -74,11 +79,26 @@ def plan(problem: PlanningProblem, planner: str = "astar", **settings: Any) -> R
     began = time.perf_counter()
     engine_class, settings_class = named(planner)
     chosen = settings_class(**settings)
-    costmap = costmap_of(problem)
-    found = engine_class(costmap).search(tuple(problem.start), tuple(problem.goal), chosen)
+    space = space_of(problem)
+    if isinstance(space, Voxels):
+        return _plan_3d(space, planner, chosen, began)
+    engine = engine_class(space)
+    found = engine.search(tuple(problem.start), tuple(problem.goal), chosen)
     if found is None:
-        raise enclosed(costmap)
-    return answer(costmap, found, planner=planner, seconds=time.perf_counter() - began)
+        raise enclosed(space)
+    return answer(space, found, planner=engine.name, seconds=time.perf_counter() - began)
+
+
+def _plan_3d(space: Voxels, planner: str, settings: SearchSettings, began: float) -> Route:
+    if planner not in SPATIAL:
+        expected = f"one that plans on 3-D maps: {', '.join(SPATIAL)}"
+        raise ProblemError("planner", expected, repr(planner))
+    problem = space.problem
+    engine = AStar3D(space)
+    found = engine.search(tuple(problem.start), tuple(problem.goal), settings)
+    if found is None:
+        raise enclosed_3d(space)
+    return answer(space, found, planner=engine.name, seconds=time.perf_counter() - began)
 
 
 def named(planner: str) -> Planner:

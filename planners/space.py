@@ -12,7 +12,7 @@ from planners.problem import PlanningProblem
 
 
 class Space(Protocol):
-    """A map as a problem sees it: `planners.costmap.Costmap`, or `planners.voxels.Voxels` in 3-D."""
+    """A map as a problem sees it: `planners.costmap.Costmap`; in 3-D, `planners.voxels.Voxels`."""
 
     @property
     def problem(self) -> PlanningProblem:
@@ -22,6 +22,21 @@ class Space(Protocol):
     @property
     def window(self) -> GridWindow:
         """The map's cells."""
+        ...
+
+    @property
+    def blocked(self) -> Bools:
+        """Cells that the footprint may not touch."""
+        ...
+
+    @property
+    def nonfree(self) -> Bools:
+        """Those among them that are non-free."""
+        ...
+
+    @property
+    def stand(self) -> Bools:
+        """Cells on whose centre the footprint's centre may be."""
         ...
 
     @property
@@ -38,8 +53,8 @@ class Space(Protocol):
         """Return positions in cells."""
         ...
 
-    def clearance_of(self, points: npt.ArrayLike) -> float:
-        """Return the exact distance of a polyline to what is blocked [m]."""
+    def clearance_of(self, points: npt.ArrayLike, *, to: Bools | None = None) -> float:
+        """Return the exact distance of a point or a polyline to what is blocked [m]."""
         ...
 
     def clearance_at(self, cells: Ints) -> Floats:

@@ -186,15 +186,22 @@ def test_plan_says_why_there_is_no_route(
         (("--unknown", "maybe"), "unknown: expected 'avoid', 'allow' or 'penalise', got 'maybe'"),
         (("--time-limit", "nan"), "time_limit: expected a finite number"),
         (("--speed", "3"), "No such option: --speed"),
+        (("--out", "route.txt"), "path: expected a name that ends in .geojson, .json, .csv, .yaml"),
+        (("--footprint", "0,0 1,1"), "footprint: expected a radius of 0 or more [m], or 3 or more"),
+        (("--footprint", "0,0 1,1 1"), "expected 2 numbers with commas between, got '1'"),
+        (("--set", "weight"), "expected NAME=VALUE, each name once, got 'weight'"),
+        (("--set", "weight=3"), "weight: expected a setting of AStarSettings"),
+        (("--clearance-weight", "-1"), "clearance_weight: expected greater than or equal to 0"),
+        (("--planner", "all", "--set", "weight=3"), "--out and --set are for one planner, not all"),
     ],
 )
 def test_plan_refuses_bad_options(square: Path, options: tuple[str, ...], sentence: str) -> None:
     assert_refused(plan(square, *options), 2, None, sentence)
 
 
-@pytest.mark.parametrize("option", ["--out", "--plot"])
-def test_plan_looks_at_the_folder_before_the_work(tmp_path: Path, option: str) -> None:
-    nowhere = tmp_path / "not" / "there" / "route.png"
+@pytest.mark.parametrize(("option", "name"), [("--out", "route.csv"), ("--plot", "route.png")])
+def test_plan_looks_at_the_folder_before_the_work(tmp_path: Path, option: str, name: str) -> None:
+    nowhere = tmp_path / "not" / "there" / name
     ran = plan(tmp_path / "no-map.npz", option, nowhere)  # the map is not even looked for
     assert_refused(ran, 2, "FileFormatError", "expected a file in a folder that exists")
 

@@ -16,8 +16,8 @@ from PIL import Image
 
 from groundmap.errors import FileFormatError, InputError
 from groundmap.grid import ConfidenceGrid
-from groundmap.io.map_images import BlockedMap, read_ros_map
-from groundmap.io.movingai import read_movingai_map
+from groundmap.io.load import load_map
+from groundmap.io.map_images import BlockedMap, BlockedVoxels, grid_of, read_ros_map
 from groundmap.io.ros_map import write_ros_map
 from groundmap.window import CellState
 from strategies import rngs
@@ -43,11 +43,6 @@ def ros_map(folder: Path, pixels: Any = ((0, 254),), *, without: str = "", **key
     kept = {key: value for key, value in (KEYS | keys).items() if key != without}
     (folder / "map.yaml").write_text(yaml.safe_dump(kept))
     return folder / "map.yaml"
-
-
-def movingai_map(folder: Path, text: str) -> Path:
-    (folder / "some.map").write_bytes(text.encode())
-    return folder / "some.map"
 
 
 def drawn(found: BlockedMap) -> list[str]:
@@ -198,71 +193,47 @@ def test_an_image_that_is_none_or_cut_short_is_refused(tmp_path: Path, content: 
         read_ros_map(path)
 
 
-# MovingAI
-
-HEADER = "type octile\nheight 2\nwidth 3\nmap\n"
+# Maps to plan on
 
 
-def test_a_movingai_map_keeps_its_rows_in_the_order_of_the_file(tmp_path: Path) -> None:
-    found = read_movingai_map(movingai_map(tmp_path, HEADER + "@..\n..T\n"), resolution=0.25)
-    assert drawn(found) == ["#..", "..#"]
-    assert (found.resolution, found.origin) == (0.25, (0.0, 0.0))
+@given(rngs(), st.sampled_from([2, 3]))
+def test_a_grid_of_blocked_cells_says_what_they_say(rng: np.random.Generator, ndim: int) -> None:
+    shape, corner = tuple(rng.integers(1, 20, ndim)), tuple(rng.uniform(-9, 9, ndim).tolist())
+    blocked = rng.random(shape) < 0.5
+    unknown = ~blocked & (rng.random(shape) < 0.5)
+    found: BlockedMap | BlockedVoxels = BlockedMap(blocked, unknown, 0.5, corner[:2])
+    if len(corner) == 3:
+        unknown[...] = False
+        found = BlockedVoxels(blocked, 0.5, corner)
+    grid = grid_of(found, frame="house")
+    window = grid.window(np.concatenate([corner, np.array(corner) + np.array(shape[::-1]) * 0.5]))
+    states = window.states()[tuple(map(slice, shape))]
+    expected = np.where(blocked, CellState.NONFREE, CellState.FREE)
+    npt.assert_array_equal(states, np.where(unknown, CellState.UNKNOWN, expected))
+    assert grid.frame == "house"
 
 
-def test_every_kind_of_cell_is_free_or_blocked(tmp_path: Path) -> None:
-    found = read_movingai_map(movingai_map(tmp_path, HEADER + ".GS\n@OT\n"))
-    assert drawn(found) == ["...", "###"]
-    assert drawn(read_movingai_map(movingai_map(tmp_path, HEADER + "W..\n...\n")))[0] == "#.."
+def test_a_map_is_loaded_by_its_suffix(tmp_path: Path) -> None:
+    grid = load_map(ros_map(tmp_path))
+    assert grid.confidence_at([(1.2, 2.2), (1.7, 2.2)]) == pytest.approx([1.0, -1.0])
+    grid.save(tmp_path / "own.npz")
+    assert load_map(tmp_path / "own.npz").window().count.sum() == 2
+    (tmp_path / "a.map").write_text("type octile\nheight 1\nwidth 2\nmap\n.@\n")
+    assert load_map(tmp_path / "a.map").confidence_at((1.5, 0.5)) == 1.0
+    (tmp_path / "a.3dmap").write_text("voxel 2 1 1\n1 0 0\n")
+    assert load_map(tmp_path / "a.3dmap").confidence_at((1.5, 0.5, 0.5)) == 1.0
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        (HEADER + "@..\n..T\n").replace("\n", "\r\n"),
-        HEADER + "@..\n..T",
-        HEADER + "@..\n..T\n\n\n",
-        "version 1.0\n" + HEADER + "@..\n..T\n",
-        "type octile\nwidth 3\nheight 2 \nmap\n@..\n..T\n",
-    ],
-)
-def test_line_ends_and_headers_differ_and_the_map_does_not(tmp_path: Path, text: str) -> None:
-    assert drawn(read_movingai_map(movingai_map(tmp_path, text))) == ["#..", "..#"]
+@pytest.mark.parametrize("name", ["map.pgm", "map.PNG"])
+def test_an_image_alone_is_no_map(name: str) -> None:
+    with pytest.raises(InputError, match=rf"{name}: expected a map, got an image. Give the .yaml"):
+        load_map(name)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (HEADER + "...\n", "expected 2 rows, got 1. Was the file cut short"),
-        (HEADER, "expected 2 rows, got 0. Was the file cut short"),
-        (HEADER + "...\n...\n...\n", "expected 2 rows, got 3"),
-        (HEADER + "...\n..\n", "expected 3 cells, got 2 at line 6"),
-        (HEADER + "....\n...\n", "expected 3 cells, got 4 at line 5"),
-        (HEADER + "...\n.x.\n", "expected cells of .*, got 'x' at line 6"),
-        (HEADER + "...\n.é.\n", "expected cells of .*, got 'é' at line 6"),
-        ("", "expected a line 'map', got none"),
-        ("type octile\nheight 2\n", "expected a line 'map', got none"),
-        ("type octile\nheight 2\nmap\n", "expected width before the map, got none at line 3"),
-        ("type octile\nheight -2\n", "expected height and a number above 0, .* at line 2"),
-        ("height 0\n", "expected height and a number above 0, got 'height 0' at line 1"),
-        ("width\n", "expected width and a number above 0, got 'width' at line 1"),
-        ("image: map.pgm\n", "expected type, height, width or map, got 'image: map.pgm' at line 1"),
-    ],
-)
-def test_a_map_that_breaks_its_format_is_refused(tmp_path: Path, text: str, message: str) -> None:
-    with pytest.raises(FileFormatError, match=f"some.map: {message}"):
-        read_movingai_map(movingai_map(tmp_path, text))
-
-
-def test_a_missing_map_is_named(tmp_path: Path) -> None:
-    with pytest.raises(FileFormatError, match=r"gone.map: expected a readable file, got no such"):
-        read_movingai_map(tmp_path / "gone.map")
-
-
-@pytest.mark.parametrize("resolution", [0.0, -1.0, float("nan")])
-def test_cells_have_a_size(tmp_path: Path, resolution: float) -> None:
-    path = movingai_map(tmp_path, HEADER + "...\n...\n")
-    with pytest.raises(InputError, match=r"resolution: expected a number above 0 \[m\]"):
-        read_movingai_map(path, resolution=resolution)
+def test_another_file_is_not_a_map(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("nothing")
+    with pytest.raises(FileFormatError, match=r"notes.txt: expected"):
+        load_map(tmp_path / "notes.txt")
 
 
 # Real ones
@@ -277,15 +248,3 @@ def test_grey_205_of_the_ros_maps_is_what_their_yaml_makes_of_it(name: str, unkn
     npt.assert_array_equal(found.blocked, (255 - grey) / 255 > 0.65)
     assert (grey == 205).any()
     assert (found.unknown[grey == 205] == unknown).all()
-
-
-@needs_data
-@pytest.mark.parametrize(
-    "path", sorted((DATA / "movingai").glob("*/*.map")), ids=lambda path: path.stem
-)
-def test_published_queries_start_and_end_in_free_cells(path: Path) -> None:
-    found = read_movingai_map(path)
-    rows = path.with_name(path.name + ".scen").read_text(encoding="ascii").splitlines()[1:]
-    cols_rows = np.array([row.split()[-5:-1] for row in rows if row], dtype=int).reshape(-1, 2)
-    assert not found.blocked[cols_rows[:, 1], cols_rows[:, 0]].any()
-    assert found.blocked.any()

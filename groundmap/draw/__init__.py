@@ -9,7 +9,7 @@ from groundmap.draw.case import draw_case
 from groundmap.draw.curves import curves_png, draw_curves
 from groundmap.draw.figure import check_picture, figure_png, new_figure, save_figure
 from groundmap.draw.maps import draw_grid, draw_trajectory, draw_verdicts, known_bounds
-from groundmap.draw.routes import draw_route
+from groundmap.draw.routes import draw_route, draw_routes
 from groundmap.draw.truth import draw_difference, draw_truth
 from groundmap.draw.views import draw_view
 
@@ -21,6 +21,7 @@ __all__ = [
     "draw_difference",
     "draw_grid",
     "draw_route",
+    "draw_routes",
     "draw_trajectory",
     "draw_truth",
     "draw_verdicts",

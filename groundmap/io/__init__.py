@@ -1,8 +1,20 @@
-"""Files: logs of views in, logs of views and maps for other programs out."""
+"""Files: logs of views and maps in, logs of views and maps for other programs out."""
 
 from groundmap.io.export import EXPORTERS, export
 from groundmap.io.folder_writer import write_views
 from groundmap.io.formats import FORMATS, read_views
+from groundmap.io.load import LOADERS, load_map
 from groundmap.io.log import ViewLog
+from groundmap.io.map_images import grid_of
 
-__all__ = ["EXPORTERS", "FORMATS", "ViewLog", "export", "read_views", "write_views"]
+__all__ = [
+    "EXPORTERS",
+    "FORMATS",
+    "LOADERS",
+    "ViewLog",
+    "export",
+    "grid_of",
+    "load_map",
+    "read_views",
+    "write_views",
+]

@@ -69,12 +69,8 @@ def read_movingai_scen(path: str | PathLike[str]) -> list[MovingAIQuery]:
 
 def _check_version(path: Path, lines: Iterator[tuple[int, str]]) -> None:
     number, line = next(lines, (1, ""))
-    key, _, version = line.partition(" ")
-    try:
-        known = key == "version" and float(version) == 1.0
-    except ValueError:
-        known = False
-    if not known:
+    key, *numbers = line.split() or [""]
+    if key != "version" or numbers not in (["1"], ["1.0"]):
         raise FileFormatError(path, "'version 1'", repr(line[:SHOWN_CHARACTERS]), line=number)
 
 

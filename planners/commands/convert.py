@@ -7,14 +7,15 @@ from typing import Annotated
 
 import typer
 
-from groundmap import ConfidenceGrid
 from groundmap.archive import check_writable
-from groundmap.io import export
+from groundmap.io import export, load_map
 from planners.console import JsonOption, emit
 
 
 def convert_command(
-    map_file: Annotated[Path, typer.Argument(metavar="IN", help="A map that `map` wrote.")],
+    map_file: Annotated[
+        Path, typer.Argument(metavar="IN", help="A map that `map` wrote, or one for map_server.")
+    ],
     out: Annotated[
         Path,
         typer.Argument(help=".npz: dense arrays; .yaml: Nav2's map_server (with a .pgm beside)."),
@@ -23,5 +24,5 @@ def convert_command(
 ) -> None:
     """Write a map in another program's form."""
     check_writable(out, source=map_file)
-    export(ConfidenceGrid.load(map_file), out)
+    export(load_map(map_file), out)
     emit({"out": str(out)}, as_json=as_json, title=f"converted {map_file}")

@@ -7,16 +7,19 @@ from typing import Annotated
 
 import typer
 
-from groundmap import CellState, ConfidenceGrid
+from groundmap import CellState
+from groundmap.io import load_map
 from planners.console import JsonOption, emit
 
 
 def info_command(
-    map_file: Annotated[Path, typer.Argument(metavar="MAP", help="A map that `map` wrote.")],
+    map_file: Annotated[
+        Path, typer.Argument(metavar="MAP", help="A map that `map` wrote, or one for map_server.")
+    ],
     as_json: JsonOption = False,
 ) -> None:
     """Tell what a map file holds: areas [m²], bounds [m], rule, poses."""
-    grid = ConfidenceGrid.load(map_file)
+    grid = load_map(map_file)
     poses = grid.trajectory
     result = {
         "resolution": grid.resolution,

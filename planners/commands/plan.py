@@ -7,24 +7,45 @@ from typing import Annotated, cast
 
 import typer
 
-from groundmap import ConfidenceGrid
 from groundmap.archive import check_writable
 from groundmap.draw import check_picture
+from groundmap.io import load_map
+from planners.commands.options import assignments, outline
 from planners.commands.plot import draw_map
-from planners.console import JsonOption, emit, numbers
+from planners.console import JsonOption, emit, emit_rows, numbers, watched
+from planners.costs import CostSettings
+from planners.errors import NoRouteError, PlanningError
 from planners.problem import PlanningProblem, Unknown
 from planners.registry import PLANNERS, plan
+from planners.route import Route, check_route_file
+from planners.shortcut import shortcut
+
+ALL = "all"  # instead of a planner's name
+COLUMNS = ("length", "cost", "bound", "min_clearance", "mean_clearance", "min_confidence",
+           "mean_confidence", "expanded", "seconds")  # fmt: skip
+PLAIN = CostSettings()
 
 
 def plan_command(
-    map_file: Annotated[Path, typer.Argument(metavar="MAP", help="A map that `map` wrote.")],
+    map_file: Annotated[
+        Path, typer.Argument(metavar="MAP", help="A map that `map` wrote, or one for map_server.")
+    ],
     start: Annotated[str, typer.Option(metavar="X,Y[,YAW]", help="Start [m, rad; map].")],
     goal: Annotated[str, typer.Option(metavar="X,Y[,YAW]", help="Goal [m, rad; map].")],
-    footprint: Annotated[float, typer.Option(help="Radius of the robot [m].")],
+    footprint: Annotated[
+        str,
+        typer.Option(
+            metavar="R | 'X,Y X,Y X,Y ...'",
+            help="Radius of the robot [m], or corners of its outline [m, base_link].",
+        ),
+    ],
     planner: Annotated[
-        str, typer.Option(help=f"Planner: {', '.join(sorted(PLANNERS))}.")
+        str,
+        typer.Option(help=f"Planner: {', '.join(sorted(PLANNERS))}; or all, to compare them."),
     ] = "astar",
-    out: Annotated[Path | None, typer.Option(help="Write the route as GeoJSON.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Write the route: .geojson, .csv, or .yaml (a ROS path).")
+    ] = None,
     plot: Annotated[
         Path | None, typer.Option(help="Draw map and route: .png, .pdf or .svg.")
     ] = None,
@@ -34,25 +55,98 @@ def plan_command(
     clear_start: Annotated[
         bool, typer.Option(help="Count unknown cells near the start as free.")
     ] = True,
+    clearance_weight: Annotated[
+        float, typer.Option(help="Extra cost of a metre that just clears obstacles [m/m].")
+    ] = PLAIN.clearance_weight,
+    inflation_radius: Annotated[
+        float, typer.Option(help="Clearance that costs nothing any more [m].")
+    ] = PLAIN.inflation_radius,
+    confidence_weight: Annotated[
+        float, typer.Option(help="Extra cost of a metre of confidence 0 [m/m].")
+    ] = PLAIN.confidence_weight,
+    unknown_weight: Annotated[
+        float, typer.Option(help="Extra cost of an unknown metre, if penalised [m/m].")
+    ] = PLAIN.unknown_weight,
     time_limit: Annotated[float, typer.Option(help="Give up after [s].")] = 30.0,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="A setting of the planner."),
+    ] = None,
+    straighten: Annotated[
+        bool, typer.Option("--shortcut", help="Cut the route's corners as far as is safe.")
+    ] = False,
+    turning_radius: Annotated[
+        float | None, typer.Option("--smooth", help="Round corners with at least this radius [m].")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Plan a collision-free route on a map."""
     if out is not None:
+        check_route_file(out)
         check_writable(out, source=map_file)
     if plot is not None:
         check_picture(plot)
+    if planner == ALL and (out is not None or settings):
+        raise typer.BadParameter(f"--out and --set are for one planner, not {ALL}")
     problem = PlanningProblem(
-        ConfidenceGrid.load(map_file),
+        load_map(map_file),
         start=numbers("start", start, 2, 3),
         goal=numbers("goal", goal, 2, 3),
-        footprint=footprint,
+        footprint=outline(footprint),
         unknown=cast(Unknown, unknown),  # the problem refuses others, in its own words
         clear_start=clear_start,
+        costs=CostSettings(
+            clearance_weight=clearance_weight,
+            inflation_radius=inflation_radius,
+            confidence_weight=confidence_weight,
+            unknown_weight=unknown_weight,
+        ),
     )
-    route = plan(problem, planner=planner, time_limit=time_limit)
+    if planner == ALL:
+        _compare(problem, plot, time_limit, as_json=as_json, title=f"routes on {map_file}")
+        return
+    route = plan(problem, planner, time_limit=time_limit, **assignments(settings or []))
+    if straighten:
+        route = shortcut(problem, route)
     if out is not None:
-        route.save_geojson(out)
+        route.save(out)
     if plot is not None:
-        draw_map(problem.grid, plot, waypoints=route.waypoints, footprint=footprint)
+        draw_map(
+            problem.grid,
+            plot,
+            waypoints=route.waypoints,
+            footprint=problem.shape.to_value(),
+            headings=route.headings,
+        )
     emit(route.to_dict(), as_json=as_json, title=f"route of {planner} on {map_file}")
+
+
+def _compare(
+    problem: PlanningProblem, plot: Path | None, time_limit: float, *, as_json: bool, title: str
+) -> None:
+    """Plan with every planner there is; say why one brings no route, and go on."""
+    routes: dict[str, Route] = {}
+    refused: dict[str, str] = {}
+    failures: list[NoRouteError] = []
+    names = sorted(PLANNERS)
+    for name in watched(names, total=len(names), what="planners"):
+        try:
+            routes[name] = plan(problem, name, time_limit=time_limit)
+        except NoRouteError as error:
+            refused[name] = str(error)
+            failures.append(error)
+        except PlanningError as error:
+            refused[name] = str(error)
+    if not routes and failures:
+        raise failures[0]
+    if plot is not None:
+        lines = {name: route.waypoints for name, route in routes.items()}
+        draw_map(problem.grid, plot, lines=lines)
+    if as_json:
+        found = {name: route.to_dict() for name, route in routes.items()}
+        emit({"routes": found, "refused": refused}, as_json=True, title=title)
+        return
+    rows = {name: {key: getattr(route, key) for key in COLUMNS} for name, route in routes.items()}
+    emit_rows(rows, title=title)
+    for name, reason in refused.items():
+        print(f"{name}: {reason}")

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from itertools import islice
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+import numpy.typing as npt
 import typer
 
 from groundmap import ConfidenceGrid, GroundMapper, draw, fit_ground, read_views
 from groundmap.arrays import Floats, as_floats
 from groundmap.errors import FileFormatError, InputError
+from groundmap.io import load_map
 from planners.commands.settings_file import ConfigOption, read_settings
 from planners.console import JsonOption, emit, numbers
 
@@ -20,10 +23,10 @@ from planners.console import JsonOption, emit, numbers
 def plot_command(
     map_file: Annotated[
         Path,
-        typer.Argument(metavar="MAP", help="A map that `map` wrote; with --explain, a log."),
+        typer.Argument(metavar="MAP", help="A map, as for `plan`; with --explain, a log."),
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Picture: .png, .pdf or .svg; MAP with .png unless told.")
+        Path | None, typer.Option(help="Picture: .png, .pdf or .svg; beside MAP unless told.")
     ] = None,
     explain: Annotated[
         int | None,
@@ -43,13 +46,15 @@ def plot_command(
     as_json: JsonOption = False,
 ) -> None:
     """Draw a map: free, non-free, contested and unknown space, and where it was seen from."""
-    picture = out or map_file.with_suffix(".png")
+    picture = out or _beside(map_file)
     draw.check_picture(picture)
     if explain is not None:
         _draw_view(map_file, explain, camera_height, read_settings(config), picture)
         emit({"out": str(picture)}, as_json=as_json, title=f"view {explain} of {map_file}")
         return
-    grid = ConfidenceGrid.load(map_file)
+    grid = load_map(map_file)
+    if grid.ndim != 2:
+        raise InputError(str(map_file), "a 2-D map", f"one of {grid.ndim}-D")
     box = None if bounds is None else np.array(numbers("bounds", bounds, 4))
     waypoints = None if route is None else _read_route(route)
     draw_map(grid, picture, bounds=box, waypoints=waypoints, footprint=footprint)
@@ -62,16 +67,27 @@ def draw_map(
     *,
     bounds: Floats | None = None,
     waypoints: Floats | None = None,
-    footprint: float = 0.0,
+    footprint: float | npt.ArrayLike = 0.0,
+    headings: Floats | None = None,
+    lines: Mapping[str, Floats] | None = None,
 ) -> None:
-    """Draw a map, its trajectory and a route into a file."""
+    """Draw a map, its trajectory, and a route or several lines with their names into a file."""
     box = draw.known_bounds(grid) if bounds is None else bounds
     figure, axes = draw.new_figure(box)
     draw.draw_grid(grid, bounds=box, ax=axes)
     draw.draw_trajectory(grid.trajectory, ax=axes)
     if waypoints is not None:
-        draw.draw_route(waypoints, footprint=footprint, ax=axes)
+        draw.draw_route(waypoints, footprint=footprint, headings=headings, ax=axes)
+    if lines is not None:
+        draw.draw_routes(lines, ax=axes)
     draw.save_figure(figure, picture)
+
+
+def _beside(map_file: Path) -> Path:
+    """Return a picture's name: for a map of map_server, none that its image may have."""
+    if map_file.suffix.lower() == ".yaml":
+        return map_file.with_name(f"{map_file.stem}-plot.png")
+    return map_file.with_suffix(".png")
 
 
 def _draw_view(

@@ -1,0 +1,1 @@
+"""How fast planners are, and whether they find what others published."""

@@ -1,0 +1,109 @@
+"""Exact distance from straight lines to the nearest blocked voxel's cube.
+
+Positions are (x, y, z) in voxels: x grows with the column, y with the row, z with the layer, and
+voxel [layer, row, col] is the closed cube from (col, row, layer) to (col + 1, row + 1, layer + 1).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from groundmap.arrays import Bools, Floats
+
+HALVINGS = 60  # of a piece: beyond what a float tells apart
+
+
+@njit(cache=True, nogil=True)
+def cube_distance(a: Floats, b: Floats, x: int, y: int, z: int) -> float:
+    """Return the distance from the segment a-b to the cube of voxel [z, y, x].
+
+    Along the segment, the squared distance is convex: its minimum is where its slope, half of
+    which is `_slope`, changes sign.
+    """
+    low, high = 0.0, 1.0
+    if _slope(a, b, x, y, z, low) >= 0.0:
+        high = low
+    elif _slope(a, b, x, y, z, high) <= 0.0:
+        low = high
+    else:
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2.0
+            if _slope(a, b, x, y, z, middle) < 0.0:
+                low = middle
+            else:
+                high = middle
+    squared = 0.0
+    for axis, corner in enumerate((x, y, z)):
+        gap = _gap(a[axis] + high * (b[axis] - a[axis]), corner)
+        squared += gap * gap
+    return math.sqrt(squared)
+
+
+@njit(cache=True, nogil=True)
+def segment_clearance(blocked: Bools, a: Floats, b: Floats, limit: float) -> float:
+    """Return the distance from the segment a-b to the nearest blocked cube, at most `limit`.
+
+    Shells of voxels around the segment's box are searched outwards. A voxel in shell k is k - 1
+    whole voxels away from the box, so the search ends once that is no less than the best found.
+    """
+    layers, rows, cols = blocked.shape
+    left, right = math.floor(min(a[0], b[0])), math.floor(max(a[0], b[0]))
+    low, high = math.floor(min(a[1], b[1])), math.floor(max(a[1], b[1]))
+    down, up = math.floor(min(a[2], b[2])), math.floor(max(a[2], b[2]))
+    farthest = max(right, cols - left, high, rows - low, up, layers - down)
+    best = limit
+    for shell in range(farthest + 1):
+        if shell - 1 >= best:
+            break
+        for z in range(max(down - shell, 0), min(up + shell + 1, layers)):
+            for y in range(max(low - shell, 0), min(high + shell + 1, rows)):
+                outer = z in (down - shell, up + shell) or y in (low - shell, high + shell)
+                step = 1 if shell == 0 or outer else right - left + 2 * shell
+                for x in range(left - shell, right + shell + 1, step):
+                    if 0 <= x < cols and blocked[z, y, x]:
+                        best = min(best, cube_distance(a, b, x, y, z))
+    return best
+
+
+@njit(cache=True, nogil=True)
+def line_clearance(blocked: Bools, points: Floats) -> float:
+    """Return the distance from a polyline to the nearest blocked cube; inf if none is blocked.
+
+    Parameters
+    ----------
+    blocked : ndarray of bool, shape (layers, rows, cols)
+    points : ndarray, shape (n, 3) [voxels]
+
+    Notes
+    -----
+    Segments are cut into pieces of at most a voxel, whose boxes are small, and each piece is only
+    asked whether it betters the pieces before it.
+    """
+    best = segment_clearance(blocked, points[0], points[0], math.inf)
+    for i in range(len(points) - 1):
+        step = points[i + 1] - points[i]
+        pieces = max(1, math.ceil(np.abs(step).max()))
+        for j in range(pieces):
+            a, b = points[i] + j / pieces * step, points[i] + (j + 1) / pieces * step
+            best = segment_clearance(blocked, a, b, best)
+    return best
+
+
+@njit(cache=True, nogil=True)
+def _gap(position: float, corner: int) -> float:
+    """Return how far a coordinate is beyond a cube's interval: negative below it."""
+    if position < corner:
+        return position - corner
+    return max(position - corner - 1.0, 0.0)
+
+
+@njit(cache=True, nogil=True)
+def _slope(a: Floats, b: Floats, x: int, y: int, z: int, t: float) -> float:
+    slope = 0.0
+    for axis, corner in enumerate((x, y, z)):
+        step = b[axis] - a[axis]
+        slope += step * _gap(a[axis] + t * step, corner)
+    return slope
