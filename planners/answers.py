@@ -81,7 +81,7 @@ def check_on_map(problem: PlanningProblem) -> None:
     OutsideMapError
     """
     grid = problem.grid
-    reach = max(problem.radius, grid.resolution) if problem.clear_start else 0.0
+    reach = max(problem.radius, grid.resolution) if problem.clears_its_start else 0.0
     places: tuple[tuple[Place, Point, float], ...] = (
         ("start", problem.start_xy, reach),
         ("goal", problem.goal_xy, 0.0),

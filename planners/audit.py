@@ -48,6 +48,7 @@ def audit(problem: PlanningProblem, waypoints: Floats, *, headings: Floats | Non
     window = problem.grid.window(np.concatenate([low, high]))
     cells = _cells_near(window, line, reach)
     states = window.states(epsilon=problem.epsilon)[tuple(cells.T)]
+    cells, states = cells[states != CellState.FREE], states[states != CellState.FREE]
     squares = _squares(window, cells)
     forbidden = _forbidden(problem, states, squares, tolerance)
     names = np.array([CellState(state).name.lower() for state in states[forbidden]])
@@ -157,7 +158,7 @@ def _forbidden(
     if not problem.avoids_unknown:
         forbidden = states == CellState.NONFREE
     elif problem.clear_start:
-        away = shapely.distance(shapely.Point(problem.start_xy), squares)
+        away = shapely.distance(shapely.Point(problem.clear_place), squares)
         near = away <= problem.clear_radius + tolerance
         forbidden &= ~((states == CellState.UNKNOWN) & near)
     return forbidden

@@ -173,7 +173,7 @@ def _forbidden(
         return nonfree
     forbidden: Bools = np.ones(len(kinds), dtype=np.bool_)
     if problem.clear_start:
-        gaps = _gaps(np.array(problem.start[:3]), lower, upper)
+        gaps = _gaps(np.array(problem.clear_place), lower, upper)
         near = np.sqrt((gaps**2).sum(axis=1)) <= problem.clear_radius + tolerance
         forbidden &= ~((kinds == CellState.UNKNOWN) & near)
     return forbidden

@@ -1,38 +1,88 @@
-"""Why there is no route: who is fenced in, how far one gets, how wide the widest way is."""
+"""Why there is no route: who is fenced in, how far one gets, where the widest way is narrowest."""
 
 from __future__ import annotations
 
-import math
+from dataclasses import replace
 
 import numpy as np
-from scipy import ndimage
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from groundmap.arrays import Bools, Ints
+from groundmap.arrays import Bools
+from planners.answers import costmap_of
 from planners.costmap import Costmap
-from planners.errors import EnclosedError, Place, Point
+from planners.errors import EnclosedError, Place, Point, Turning
+from planners.footprint import Footprint
 from planners.kernels.flood import flood
-from planners.lattice import allowed_moves, squared_need
-from planners.links import is_clear, links
+from planners.lattice import allowed_moves
+from planners.links import links
+from planners.problem import PlanningProblem
+from planners.widest import WidestRoute, widest_way
 
 
-def enclosed(costmap: Costmap) -> EnclosedError:
-    """Return the exception that says why start and goal are not joined."""
+def enclosed(costmap: Costmap, *, needed: float | None = None) -> EnclosedError:
+    """Return the exception that says why start and goal are not joined.
+
+    Parameters
+    ----------
+    costmap : Costmap
+    needed : float, optional [m]
+        Width that the footprint needs, of a planner that heeds its heading; unless told, that of
+        the disc that holds it however it is turned.
+    """
     problem, resolution = costmap.problem, costmap.window.resolution
-    from_start = reachable(costmap, problem.start_xy, radius=costmap.radius)
-    from_goal = reachable(costmap, problem.goal_xy, radius=costmap.radius)
+    radius = costmap.radius if needed is None else needed / 2.0
+    from_start = reachable(costmap, problem.start_xy, radius=radius)
+    from_goal = reachable(costmap, problem.goal_xy, radius=radius)
     place: Place = "start" if from_start.sum() < from_goal.sum() else "goal"
     fenced = from_start if place == "start" else from_goal
     nearest, distance = _nearest(costmap, from_start)
+    widest = widest_way(costmap, seen_from=place)
+    turning: Turning = "heeded" if needed is not None else "anyhow"
     return EnclosedError(
         place,
         area=float(fenced.sum()) * resolution**2,
         nearest=nearest,
         distance=distance,
-        widest_gap=widest_way(costmap),
-        needed=2.0 * problem.radius,
+        widest_gap=0.0 if widest is None else widest.width,
+        bottleneck=None if widest is None else widest.bottleneck,
+        needed=2.0 * radius,
+        turning="none" if problem.shape.is_disc else turning,
     )
+
+
+def widest_route(problem: PlanningProblem) -> WidestRoute:
+    """Return the widest route from start to goal: what the widest robot would do.
+
+    The footprint does not matter, but for what is cleared around the start.
+
+    Parameters
+    ----------
+    problem : PlanningProblem
+
+    Raises
+    ------
+    OutsideMapError, NonFreeError, UnknownSpaceError
+        Start or goal is no place even for a point.
+    EnclosedError
+        No way joins them, however narrow.
+
+    Examples
+    --------
+    >>> from groundmap import ConfidenceGrid
+    >>> grid = ConfidenceGrid(resolution=0.5)
+    >>> field = np.full((64, 64), -1.0, dtype=np.float32)
+    >>> field[:, 30:32] = 1.0  # a wall
+    >>> field[40:43, 30:32] = -1.0  # and a gap of 1.5 m in it
+    >>> grid.fuse(np.array([0, 0]), field)
+    >>> route = widest_route(PlanningProblem(grid, start=(4, 9), goal=(28, 9), footprint=0.9))
+    >>> route.width, route.bottleneck, len(route.waypoints)
+    (1.5, (15.5, 20.75), 8)
+    """
+    point = replace(problem, footprint=Footprint.of(0.0), clear_start_radius=problem.clear_radius)
+    costmap = costmap_of(point)
+    widest = widest_way(costmap)
+    if widest is None:
+        raise enclosed(costmap)
+    return widest
 
 
 def reachable(costmap: Costmap, xy: Point, *, radius: float) -> Bools:
@@ -45,73 +95,12 @@ def reachable(costmap: Costmap, xy: Point, *, radius: float) -> Bools:
     radius : float [m]
         Clearance to keep on the way.
     """
+    same = radius == costmap.radius
+    moves = costmap.moves if same else allowed_moves(costmap.stand_for(radius))
     cells = links(costmap, xy, radius=radius).cells
     sources = cells[:, 0] * costmap.width + cells[:, 1]
-    mask: Bools = flood(allowed_moves(costmap.stand_for(radius)).ravel(), costmap.width, sources)
+    mask: Bools = flood(moves.ravel(), costmap.width, sources)
     return mask.reshape(costmap.blocked.shape)
-
-
-def widest_way(costmap: Costmap) -> float:
-    """Return the width of the widest way from start to goal [m]; 0 if there is none.
-
-    Ways lead over the half-cell lattice, along its lines and from cell centres to corners: steps
-    whose clearance is that of their ends (see `planners.lattice`). A narrower footprint gets
-    wherever a wider one does, so bisection over the clearances that occur, those of start and
-    goal included, ends at the answer.
-    """
-    problem, resolution = costmap.problem, costmap.window.resolution
-    ends = [costmap.clearance_of(xy) for xy in (problem.start_xy, problem.goal_xy)]
-    radii = np.append(np.sqrt(np.unique(costmap.lattice)) * resolution / 2.0, ends)
-    radii = np.unique(radii[(radii > 0) & (radii <= min(ends))])
-    low, high = -1, len(radii)  # joined at radii[low], not at radii[high]
-    while low + 1 < high:
-        middle = (low + high) // 2
-        low, high = (middle, high) if _joined(costmap, float(radii[middle])) else (low, middle)
-    return 2.0 * float(radii[low]) if low >= 0 else 0.0
-
-
-def _joined(costmap: Costmap, radius: float) -> bool:
-    """Whether a way on the lattice joins start and goal for a radius above 0 [m]."""
-    parts = _parts(costmap.lattice >= squared_need(radius, costmap.window.resolution))
-    start, goal = costmap.problem.start_xy, costmap.problem.goal_xy
-    at_start, at_goal = (
-        set(parts[_points_at(costmap, xy, radius)].tolist()) for xy in (start, goal)
-    )
-    return bool((at_start & at_goal) - {0})
-
-
-def _parts(clear: Bools) -> Ints:
-    """Return the number of the connected part of every clear lattice point; 0 where not clear.
-
-    Steps along the lattice's lines are `ndimage.label`'s; steps from a centre to a corner of its
-    cell join the parts that these find.
-    """
-    labels, count = ndimage.label(clear)
-    centres, corners = labels[1::2, 1::2], labels[::2, ::2]
-    pairs = [
-        np.stack([centres.ravel(), corner.ravel()])
-        for corner in (corners[:-1, :-1], corners[:-1, 1:], corners[1:, :-1], corners[1:, 1:])
-    ]
-    a, b = np.concatenate(pairs, axis=1)
-    both = (a > 0) & (b > 0) & (a != b)
-    graph = coo_array((np.ones(both.sum()), (a[both], b[both])), shape=(count + 1, count + 1))
-    _, part = connected_components(graph, directed=False)
-    numbers: Ints = np.where(labels > 0, part[labels] + 1, 0)
-    return numbers
-
-
-def _points_at(costmap: Costmap, xy: Point, radius: float) -> tuple[Ints, Ints]:
-    """Return the lattice points around a place, and the centres, that clear pieces join it to."""
-    x, y = costmap.to_cells(xy)[0]
-    around = [
-        (row, col)
-        for row in {math.floor(2 * y), math.ceil(2 * y)}
-        for col in {math.floor(2 * x), math.ceil(2 * x)}
-        if is_clear(costmap, (x, y), (col / 2, row / 2), radius=radius)
-    ]
-    centres = 2 * links(costmap, xy, radius=radius).cells + 1
-    rows, cols = np.concatenate([np.array(around, dtype=np.int64).reshape(-1, 2), centres]).T
-    return rows, cols
 
 
 def _nearest(costmap: Costmap, reached: Bools) -> tuple[Point, float]:

@@ -24,7 +24,9 @@ from typing import Literal, TypeAlias
 from groundmap.errors import FactualError, WrongValueError
 
 Place: TypeAlias = Literal["start", "goal"]
-Point: TypeAlias = tuple[float, float]  #: x, y [m, map]
+Turning: TypeAlias = Literal["none", "anyhow", "heeded"]
+Point: TypeAlias = tuple[float, ...]  #: x, y (on a 3-D map also z) [m, map]
+MOST_DECIMALS = 9  # of a width [m]: what is nearer is the same, up to rounding
 
 
 class PlanningError(FactualError):
@@ -64,10 +66,13 @@ y -9.75 to 9.75 m (box around the touched tiles); nothing was ever seen near it.
         nearest: Point | None = None,
     ) -> None:
         self.place, self.xy, self.bounds, self.nearest = place, xy, bounds, nearest
-        spans = "x {:.2f} to {:.2f} m and y {:.2f} to {:.2f} m"
+        half = len(bounds) // 2
+        spans = [
+            f"{axis} {low:.2f} to {high:.2f} m"
+            for axis, low, high in zip("xyz", bounds[:half], bounds[half:], strict=False)
+        ]
         extent = (
-            f"which spans {spans.format(bounds[0], bounds[2], bounds[1], bounds[3])} "
-            "(box around the touched tiles)"
+            f"which spans {' and '.join(spans)} (box around the touched tiles)"
             if bounds
             else "which is empty"
         )
@@ -142,7 +147,7 @@ class EnclosedError(NoRouteError):
     ----------
     place : {"start", "goal"}
         Which of the two is fenced in: the one whose reachable area is smaller.
-    area : float [m²]
+    area : float [m²; m³ on 3-D maps]
         Area of the cells whose centres the footprint's centre can reach from there.
     nearest : tuple of float [m, map]
         Of the places that can be reached from the start, the one nearest to the goal.
@@ -150,17 +155,23 @@ class EnclosedError(NoRouteError):
         From there to the goal.
     widest_gap : float [m]
         Width of the widest way from start to goal, on the half-cell lattice; 0 if there is none.
-        Not smaller than `needed` where the way only misses the cell centres.
+        Not smaller than `needed` where the way only misses the cell centres. NaN on 3-D maps,
+        where it is not measured.
     needed : float [m]
         Width of the footprint.
+    bottleneck : tuple of float, optional [m, map]
+        Where the widest way is narrowest; None if there is none.
+    turning : {"none", "anyhow", "heeded"}
+        What `needed` is the width of: a disc, the disc that holds an outline however it is
+        turned, or the outline itself, whose heading the planner heeds.
 
     Examples
     --------
     >>> print(EnclosedError("goal", area=12.3, nearest=(7.5, 2.0), distance=3.25,
-    ...                     widest_gap=1.04, needed=1.8))
+    ...                     widest_gap=0.52, needed=0.6, bottleneck=(12.3, 4.1)))
     no route: the goal is fenced in: an enclosed area of 12.3 m² around it; the reachable cell \
-nearest to the goal is (7.50, 2.00), 3.25 m away; the widest way from start to goal is 1.04 m \
-wide, the footprint needs 1.80 m.
+nearest to the goal is (7.50, 2.00), 3.25 m away; the widest way is 0.52 m wide at (12.30, 4.10), \
+your footprint needs 0.60 m.
     """
 
     def __init__(
@@ -172,13 +183,17 @@ wide, the footprint needs 1.80 m.
         distance: float,
         widest_gap: float,
         needed: float,
+        bottleneck: Point | None = None,
+        turning: Turning = "none",
     ) -> None:
         self.place, self.area, self.nearest, self.distance = place, area, nearest, distance
-        self.widest_gap, self.needed = widest_gap, needed
+        self.widest_gap, self.needed, self.bottleneck = widest_gap, needed, bottleneck
+        self.turning = turning
+        what = f"area of {area:.1f} m²" if len(nearest) == 2 else f"space of {area:.1f} m³"
         super().__init__(
-            f"no route: the {place} is fenced in: an enclosed area of {area:.1f} m² around it; "
-            f"the reachable cell nearest to the goal is ({nearest[0]:.2f}, {nearest[1]:.2f}), "
-            f"{distance:.2f} m away; {_gap(widest_gap, needed)}."
+            f"no route: the {place} is fenced in: an enclosed {what} around it; "
+            f"the reachable cell nearest to the goal is {_shown(nearest)}, {distance:.2f} m away"
+            f"{_gap(widest_gap, needed, bottleneck, turning)}."
         )
 
 
@@ -216,20 +231,39 @@ class AuditError(PlanningError):
         )
 
 
-def _gap(widest: float, needed: float) -> str:
+def _gap(widest: float, needed: float, at: Point | None, turning: Turning) -> str:
+    if math.isnan(widest):
+        return ""
     if widest == 0:
-        return "no way from start to goal exists, however narrow the footprint"
-    way = f"the widest way from start to goal is {widest:.2f} m wide"
+        return "; no way from start to goal exists, however narrow the footprint"
+    has, needs = _apart(widest, needed)
+    way = f"; the widest way is {has} m wide{'' if at is None else f' at {_shown(at)}'}"
+    footprint = "your footprint, turned anyhow," if turning == "anyhow" else "your footprint"
     if widest < needed:
-        return f"{way}, the footprint needs {needed:.2f} m"
-    return (
-        f"{way}, enough for what the footprint needs, {needed:.2f} m, "
-        "but not along cell centres: map with smaller cells"
+        return f"{way}, {footprint} needs {needs} m"
+    but = (
+        "there is no way to drive it along there"
+        if turning == "heeded"
+        else "not along cell centres: map with smaller cells"
     )
+    return f"{way}, enough for what {footprint} needs, {needs} m, but {but}"
+
+
+def _apart(a: float, b: float) -> tuple[str, str]:
+    """Return two numbers with as many decimals as tell them apart, mostly two."""
+    for decimals in range(2, MOST_DECIMALS + 1):
+        shown = f"{a:.{decimals}f}", f"{b:.{decimals}f}"
+        if shown[0] != shown[1]:
+            return shown
+    return f"{a:.2f}", f"{b:.2f}"
 
 
 def _at(place: Place, xy: Point) -> str:
-    return f"{place} ({xy[0]:.2f}, {xy[1]:.2f})"
+    return f"{place} {_shown(xy)}"
+
+
+def _shown(xy: Point) -> str:
+    return f"({', '.join(f'{value:.2f}' for value in xy)})"
 
 
 def _footprint(radius: float, yaw: float | None) -> str:
@@ -242,4 +276,4 @@ def _instead(xy: Point, nearest: Point | None) -> str:
     if nearest is None:
         return ""
     away = math.dist(xy, nearest)
-    return f" The nearest place for it is ({nearest[0]:.2f}, {nearest[1]:.2f}), {away:.2f} m away."
+    return f" The nearest place for it is {_shown(nearest)}, {away:.2f} m away."

@@ -13,6 +13,7 @@ from groundmap.arrays import Floats
 from planners.errors import ProblemError
 
 EXPECTED = "a radius of 0 or more [m], or 3 or more points x, y [m, base_link] of a simple polygon"
+MOST_DISCS = 16  # to cover a polygon with
 FLAT = 1e-12  # area, as a share of the squared extent, below which a polygon is a line
 
 
@@ -100,6 +101,41 @@ points x, y [m, base_link] of a simple polygon, got one that meets itself at (0.
         sides = np.diff(hull, axis=0)  # the narrowest extent is across one of the hull's sides
         normals = np.column_stack([-sides[:, 1], sides[:, 0]]) / np.hypot(*sides.T)[:, None]
         return float(np.ptp(normals @ hull.T, axis=1).min())
+
+    def convex_parts(self) -> list[Floats]:
+        """Return convex polygons that together are the polygon, as `polygon`; none for a disc.
+
+        They are the polygon itself if it is convex, and otherwise the triangles of its constrained
+        Delaunay triangulation.
+        """
+        if self.polygon is None:
+            return []
+        whole = shapely.Polygon(self.polygon)
+        if whole.convex_hull.area - whole.area <= FLAT * whole.area:
+            return [self.polygon]
+        triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(whole))
+        return [shapely.get_coordinates(shapely.orient_polygons(t))[:-1] for t in triangles]
+
+    def covering_discs(self) -> Floats:
+        """Return discs that together cover it: shape (k, 3), x, y, radius [m, base_link].
+
+        The polygon is cut across its longer side into slabs half as long as it is wide.
+        """
+        if self.polygon is None:
+            return np.array([[0.0, 0.0, self.radius]])
+        box = shapely.get_coordinates(shapely.Polygon(self.polygon).minimum_rotated_rectangle)
+        sides = np.diff(box[:3], axis=0)
+        along, across = sides[np.argsort(-np.hypot(*sides.T))]
+        slabs = int(np.clip(np.ceil(2.0 * np.hypot(*along) / np.hypot(*across)), 1, MOST_DISCS))
+        discs = []
+        for i in range(slabs):
+            begin, end = box[0] + along * i / slabs, box[0] + along * (i + 1) / slabs
+            slab = shapely.Polygon([begin, end, end + across, begin + across])
+            part = shapely.get_coordinates(slab.intersection(shapely.Polygon(self.polygon)))
+            if len(part):
+                centre = (part.min(axis=0) + part.max(axis=0)) / 2.0
+                discs.append([*centre, float(np.hypot(*(part - centre).T).max())])
+        return np.array(discs)
 
     def to_value(self) -> float | list[list[float]]:
         """Return what `of` takes, as plain numbers, for files."""

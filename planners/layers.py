@@ -70,7 +70,7 @@ def padded_window(problem: PlanningProblem) -> GridWindow:
     grid = problem.grid
     bounds = grid.bounds()
     if problem.clear_start:
-        start = np.array(problem.start_xy)
+        start = np.array(problem.clear_place)
         bounds[:2] = np.minimum(bounds[:2], start - problem.clear_radius)
         bounds[2:] = np.maximum(bounds[2:], start + problem.clear_radius)
     # One cell and a half: borders that rounding moves by a cell must not swallow the ring.
@@ -91,7 +91,7 @@ def _near_start(problem: PlanningProblem, window: GridWindow) -> Bools:
     if not problem.clear_start:
         return np.zeros(window.count.shape, dtype=np.bool_)
     rows, cols = window.count.shape
-    x, y = (np.array(problem.start_xy) - window.origin) / window.resolution
+    x, y = (np.array(problem.clear_place) - window.origin) / window.resolution
     col, row = np.arange(cols), np.arange(rows)
     dx = np.maximum(np.maximum(col - x, x - col - 1), 0.0)
     dy = np.maximum(np.maximum(row - y, y - row - 1), 0.0)

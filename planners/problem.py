@@ -45,6 +45,9 @@ class PlanningProblem:
         radius unless told. (What a forward camera sees next to itself is a wedge narrower than
         the footprint: with only the cells under the footprint cleared, the disc could never
         leave.)
+    cleared_at : sequence of float, optional
+        Where the cells are that clear_start clears, if not around the start: x, y (in 3-D:
+        x, y, z) [m, map]. Of many problems on one map, each has them in the same place.
     epsilon : float, default 0.01
         Cells of a smaller absolute confidence are contested.
 
@@ -75,6 +78,7 @@ got (0, nan).
     costs: CostSettings = PLAIN
     clear_start: bool = True
     clear_start_radius: float | None = None
+    cleared_at: Sequence[float] | Floats | None = None
     epsilon: float = EPSILON
 
     def __post_init__(self) -> None:
@@ -92,6 +96,9 @@ got (0, nan).
         if self.clear_start_radius is not None:
             radius = _radius("clear_start_radius", self.clear_start_radius)
             object.__setattr__(self, "clear_start_radius", radius)
+        if self.cleared_at is not None:
+            place = _pose("cleared_at", self.cleared_at, self.grid.ndim)
+            object.__setattr__(self, "cleared_at", place)
         if self.unknown not in get_args(Unknown):
             expected = "'avoid', 'allow' or 'penalise'"
             raise ProblemError("unknown", expected, repr(self.unknown))
@@ -123,6 +130,18 @@ got (0, nan).
     def goal_xy(self) -> Point:
         """x, y of the goal (on a 3-D map also z) [m, map]."""
         return tuple(map(float, self.goal[: self.grid.ndim]))
+
+    @property
+    def clear_place(self) -> tuple[float, ...]:
+        """Where unknown cells count as free: x, y (in 3-D: x, y, z) [m, map]."""
+        place = self.start if self.cleared_at is None else self.cleared_at
+        return tuple(float(value) for value in place[: self.grid.ndim])
+
+    @property
+    def clears_its_start(self) -> bool:
+        """Whether unknown cells around the very start count as free."""
+        start = tuple(float(value) for value in self.start[: self.grid.ndim])
+        return self.clear_start and self.clear_place == start
 
     @property
     def clear_radius(self) -> float:

@@ -6,6 +6,7 @@ import time
 from typing import Any, NamedTuple
 
 from planners.answers import answer, space_of
+from planners.ara import ARA, ARASettings
 from planners.astar import (
     AStar,
     AStarSettings,
@@ -15,12 +16,18 @@ from planners.astar import (
     WeightedAStarSettings,
 )
 from planners.astar3d import AStar3D
+from planners.auto import Auto, AutoSettings
+from planners.dstar_lite import DStarLite, DStarLiteSettings
 from planners.enclosure import enclosed
 from planners.enclosure3d import enclosed_3d
 from planners.engine import Engine, SearchSettings
 from planners.errors import ProblemError
+from planners.hybrid import HybridAStar, HybridAStarSettings
+from planners.jps import JPS, JPSPlus, JPSPlusSettings, JPSSettings
+from planners.polyanya import Polyanya, PolyanyaSettings
 from planners.problem import PlanningProblem
 from planners.route import Route
+from planners.theta import LazyTheta, LazyThetaSettings, Theta, ThetaSettings
 from planners.voxels import Voxels
 
 SPATIAL = ("astar", "auto")  # planners that plan on 3-D maps, too
@@ -35,7 +42,16 @@ class Planner(NamedTuple):
 
 PLANNERS: dict[str, Planner] = {
     "astar": Planner(AStar, AStarSettings),
+    "ara": Planner(ARA, ARASettings),
+    "auto": Planner(Auto, AutoSettings),
     "dijkstra": Planner(Dijkstra, DijkstraSettings),
+    "dstar_lite": Planner(DStarLite, DStarLiteSettings),
+    "hybrid_astar": Planner(HybridAStar, HybridAStarSettings),
+    "jps": Planner(JPS, JPSSettings),
+    "jps+": Planner(JPSPlus, JPSPlusSettings),
+    "lazy_theta": Planner(LazyTheta, LazyThetaSettings),
+    "polyanya": Planner(Polyanya, PolyanyaSettings),
+    "theta": Planner(Theta, ThetaSettings),
     "weighted_astar": Planner(WeightedAStar, WeightedAStarSettings),
 }
 

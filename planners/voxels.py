@@ -156,7 +156,7 @@ def _padded_window(problem: PlanningProblem) -> GridWindow:
     grid = problem.grid
     bounds = grid.bounds()
     if problem.clear_start:
-        start = np.array(problem.start[:3])
+        start = np.array(problem.clear_place)
         bounds[:3] = np.minimum(bounds[:3], start - problem.clear_radius)
         bounds[3:] = np.maximum(bounds[3:], start + problem.clear_radius)
     # One voxel and a half: borders that rounding moves by a voxel must not swallow the ring.
@@ -176,7 +176,7 @@ def _near_start(problem: PlanningProblem, window: GridWindow) -> Bools:
     """Return which voxels' cubes come within the clear radius of the start."""
     if not problem.clear_start:
         return np.zeros(window.count.shape, dtype=np.bool_)
-    position = (np.array(problem.start[:3]) - window.origin) / window.resolution
+    position = (np.array(problem.clear_place) - window.origin) / window.resolution
     squared = np.zeros((1, 1, 1))
     for axis, (length, at) in enumerate(zip(window.count.shape, position[::-1], strict=True)):
         first = np.arange(length)

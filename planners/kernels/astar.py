@@ -125,7 +125,8 @@ def advance(
             if (allowed >> k) & 1:
                 to = node + ROWS[k] * width + COLS[k]
                 reached = cost + steps[k & 1, int(costs[node]) + int(costs[to])]
-                if labels[to, 1] < fresh or reached < labels[to, 0]:
+                closed = labels[to, 1] & CLOSED != 0  # for good: the weight's bound holds
+                if labels[to, 1] < fresh or (reached < labels[to, 0] and not closed):
                     labels[to, 0], labels[to, 1] = reached, fresh + k
                     h = inflated(estimate(row + ROWS[k], col + COLS[k], targets), weight)
                     if on_top:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -17,6 +18,9 @@ from groundmap.simulate.parts import HoleSettings, SolidSettings
 from groundmap.simulate.scan import ScanSettings
 from groundmap.simulate.sensor import SensorSettings
 from groundmap.simulate.worlds import GENERATORS, WorldGenerator
+from planners.errors import ProblemError
+from planners.footprint import Footprint
+from planners.problem import Unknown
 from planners.registry import PLANNERS
 from planners.scenario.outcome import Bound
 
@@ -40,15 +44,29 @@ class QuerySettings(Settings):
     name: str = Field(description="what figures of it are called after")
     start: tuple[float, ...] = Field(description="x, y [m, map] and optionally yaw [rad]")
     goal: tuple[float, ...] = Field(description="x, y [m, map] and optionally yaw [rad]")
-    footprint: float = Field(ge=0, description="radius to plan with [m]")
+    footprint: float | tuple[tuple[float, float], ...] = Field(
+        description="what to plan with: a radius [m], or the corners of an outline [m, base_link]"
+    )
     robot_radius: float | None = Field(
         None, ge=0, description="what must not touch the true world; the footprint unless told [m]"
     )
     expect: Expected = Field("route", description="'route', or the name of the error")
+    reason: str | None = Field(
+        None, description="pattern that the error's sentence holds, as Python's re takes it"
+    )
     planner: str = Field("astar", description="name of the planner")
+    unknown: Unknown = Field("avoid", description="unknown and contested space")
+    time_limit: float | None = Field(
+        None, ge=0, description="search time [s]; the planner's own unless told"
+    )
     max_ratio: float | None = Field(
         None, ge=1, description="of the route's length to that of the best in the true world"
     )
+
+    @property
+    def radius(self) -> float:
+        """Radius of the disc that holds the footprint at every heading [m]."""
+        return Footprint.of(self.footprint).radius
 
 
 class BoundSettings(Settings):
@@ -167,9 +185,7 @@ def _scenario(path: Path, content: dict[str, Any]) -> Scenario:
         hole.hole()
     queries = tuple(QuerySettings(**table) for table in head.queries)
     for query in queries:
-        if query.planner not in PLANNERS:
-            known = ", ".join(sorted(PLANNERS))
-            raise InputError("queries.planner", f"one of {known}", repr(query.planner))
+        _check(query)
     names = [query.name for query in queries]
     if len(set(names)) < len(names):
         raise InputError("queries", "a name of its own for each", ", ".join(names))
@@ -191,6 +207,24 @@ def _scenario(path: Path, content: dict[str, Any]) -> Scenario:
         queries=queries,
         bounds={name: _bound(name, table) for name, table in head.bounds.items()},
     )
+
+
+def _check(query: QuerySettings) -> None:
+    """Refuse what would only show when the query is asked, or never."""
+    if query.planner not in PLANNERS:
+        known = ", ".join(sorted(PLANNERS))
+        raise InputError("queries.planner", f"one of {known}", repr(query.planner))
+    try:
+        Footprint.of(query.footprint)
+    except ProblemError as error:
+        raise InputError(f"queries.{error.name}", error.expected, error.got) from error
+    if query.reason is not None and query.expect == "route":
+        raise InputError("queries.reason", "none where a route is expected", repr(query.reason))
+    try:
+        re.compile(query.reason or "")
+    except re.error as error:
+        expected = f"a regular expression ({error})"
+        raise InputError("queries.reason", expected, repr(query.reason)) from error
 
 
 def _tables(world: dict[str, Any], name: str) -> list[dict[str, Any]]:

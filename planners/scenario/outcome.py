@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, field
 from typing import Any
 
+REASON = "reason"  # figure of a query that an error answers: its sentence
 Figure = float | int | str | None  # None: there was nothing to measure
 
 
@@ -16,11 +18,14 @@ class Bound:
     min: float | None = None
     max: float | None = None
     equals: Figure = None
+    matches: str | None = None  #: a pattern that a sentence holds
 
     def holds(self, value: Figure) -> bool:
         """Return whether a figure keeps to it; one that is missing or not a number does not."""
         if self.equals is not None:
             return value == self.equals
+        if self.matches is not None:
+            return isinstance(value, str) and re.search(self.matches, value) is not None
         if value is None or isinstance(value, str) or math.isnan(value):
             return False
         return (self.min is None or value >= self.min) and (self.max is None or value <= self.max)
@@ -29,6 +34,8 @@ class Bound:
         """Return it as people write it: ``>= 0.97``."""
         if self.equals is not None:
             return f"= {self.equals}"
+        if self.matches is not None:
+            return f"with '{self.matches}' in it"
         parts = [("≥", self.min), ("≤", self.max)]
         return " and ".join(f"{sign} {value:g}" for sign, value in parts if value is not None)
 

@@ -153,7 +153,7 @@ def _figure(name: str, outcome: Outcome) -> str:
     return _tag(
         "tr",
         _tag("td", escape(name.replace("_", " "))),
-        _tag("td", escape(shown(value)), kind="number"),
+        _tag("td", escape(shown(value)), kind="" if isinstance(value, str) else "number"),
         _tag("td", escape("" if bound is None else str(bound))),
         _tag("td", mark, kind="verdict"),
         kind="" if holds is None else CLASSES[holds],

@@ -14,11 +14,12 @@ from planners.errors import PlanningError
 from planners.problem import PlanningProblem
 from planners.registry import plan
 from planners.scenario.case import QuerySettings
-from planners.scenario.outcome import Bound, Figure
+from planners.scenario.outcome import REASON, Bound, Figure
 from planners.scenario.simulated import Simulated
 
 FINE = 0.05  # [m], cells of the true world's map
 OUTCOME = "route"  # what is expected where no error is
+IN_TRUTH = {"planner": "astar", "unknown": "avoid", "time_limit": None}  # of the best route
 
 
 class Answer(NamedTuple):
@@ -33,14 +34,19 @@ class Answer(NamedTuple):
 
 def ask(query: QuerySettings, grid: ConfidenceGrid) -> Answer:
     """Plan on a map."""
+    limits = {} if query.time_limit is None else {"time_limit": query.time_limit}
     try:
-        route = plan(
-            PlanningProblem(grid, start=query.start, goal=query.goal, footprint=query.footprint),
-            planner=query.planner,
+        problem = PlanningProblem(
+            grid,
+            start=query.start,
+            goal=query.goal,
+            footprint=query.footprint,
+            unknown=query.unknown,
         )
+        route = plan(problem, planner=query.planner, **limits)
     except PlanningError as error:
-        name = type(error).__name__
-        return Answer(query, name, str(error), None, {"outcome": name})
+        name, reason = type(error).__name__, str(error)
+        return Answer(query, name, reason, None, {"outcome": name, REASON: reason})
     figures: dict[str, Figure] = {
         "outcome": OUTCOME,
         "length": route.length,
@@ -54,10 +60,10 @@ def held_to_truth(answer: Answer, simulated: Simulated, fine: ConfidenceGrid) ->
     if answer.waypoints is None:
         return answer
     query = answer.query
-    radius = query.footprint if query.robot_radius is None else query.robot_radius
+    radius = query.radius if query.robot_radius is None else query.robot_radius
     line = shapely.LineString(answer.waypoints)
     distances = shapely.distance(line, shapely.get_parts(simulated.truth.obstacles))
-    best = ask(query.model_copy(update={"footprint": radius, "planner": "astar"}), fine)
+    best = ask(query.model_copy(update={"footprint": radius, **IN_TRUTH}), fine)
     optimum = best.figures.get("length")
     figures: dict[str, Figure] = {
         **answer.figures,
@@ -74,6 +80,8 @@ def held_to_truth(answer: Answer, simulated: Simulated, fine: ConfidenceGrid) ->
 def bounds_of(query: QuerySettings, *, known_world: bool) -> dict[str, Bound]:
     """Return what the figures of a query are held to."""
     bounds = {"outcome": Bound(equals=query.expect)}
+    if query.reason is not None:
+        bounds[REASON] = Bound(matches=query.reason)
     if query.expect == OUTCOME and known_world:
         bounds["collisions"] = Bound(max=0)
     if query.max_ratio is not None:

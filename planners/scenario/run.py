@@ -99,7 +99,7 @@ def _recorded(scenario: Scenario) -> Result:
     draw.draw_trajectory(mapper.grid.trajectory, ax=axes)
     for answer in answers:
         if answer.waypoints is not None:
-            draw.draw_route(answer.waypoints, footprint=answer.query.footprint, ax=axes)
+            draw.draw_route(answer.waypoints, footprint=answer.query.radius, ax=axes)
     return Result(figures, answers, draw.figure_png(figure, dpi=DPI))
 
 
@@ -124,7 +124,7 @@ def _picture(simulated: Simulated, answers: list[Answer], title: str) -> bytes:
             window.resolution,
         ),
         routes=[
-            (answer.query.name, answer.waypoints, answer.query.footprint)
+            (answer.query.name, answer.waypoints, answer.query.radius)
             for answer in answers
             if answer.waypoints is not None
         ],

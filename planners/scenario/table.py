@@ -4,22 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from planners.scenario.outcome import Outcome
+from planners.scenario.outcome import REASON, Outcome
 
 VERDICTS = {True: "passed", False: "FAILED", None: "skipped"}
 
 
 def print_table(outcomes: Sequence[Outcome]) -> None:
-    """Print a line for each outcome, below it what it missed, and how many there are of each.
+    """Print a line for each outcome, and how many there are of each.
+
+    Below the line is what the outcome missed, and why there are no routes where there are none.
 
     Examples
     --------
     >>> print_table([
-    ...     Outcome("room", "a room", True, seconds=1.26),
+    ...     Outcome(
+    ...         "room",
+    ...         "a room",
+    ...         True,
+    ...         figures={"through.reason": "no route: the goal is fenced in."},
+    ...         seconds=1.26,
+    ...     ),
     ...     Outcome("glass door", "glass", False, missed=("false_free: 0.2, not ≤ 0.01",)),
     ...     Outcome("drive", "a log", None, skipped="no such file"),
     ... ])
     room        passed      1.3 s
+        through: no route: the goal is fenced in.
     glass door  FAILED      0.0 s
         false_free: 0.2, not ≤ 0.01
     drive       skipped     0.0 s
@@ -29,8 +38,8 @@ def print_table(outcomes: Sequence[Outcome]) -> None:
     width = max((len(outcome.name) for outcome in outcomes), default=0)
     for outcome in outcomes:
         print(f"{outcome.name:<{width}}  {verdict(outcome):<7}  {outcome.seconds:6.1f} s")
-        for remark in remarks(outcome):
-            print(f"    {remark}")
+        for sentence in (*remarks(outcome), *reasons(outcome)):
+            print(f"    {sentence}")
     print(summary(outcomes))
 
 
@@ -42,6 +51,16 @@ def verdict(outcome: Outcome) -> str:
 def remarks(outcome: Outcome) -> tuple[str, ...]:
     """Return what there is to say: a sentence for each missed bound, or why it was skipped."""
     return (*outcome.missed, *([outcome.skipped] if outcome.skipped else []))
+
+
+def reasons(outcome: Outcome) -> list[str]:
+    """Return why queries have no route: a sentence for each that the remarks don't hold."""
+    said = "\n".join(remarks(outcome))
+    return [
+        f"{name.removesuffix(f'.{REASON}')}: {value}"
+        for name, value in outcome.figures.items()
+        if name.endswith(f".{REASON}") and str(value) not in said
+    ]
 
 
 def summary(outcomes: Sequence[Outcome]) -> str:

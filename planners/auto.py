@@ -1,0 +1,34 @@
+"""The fastest exact planner that a problem allows."""
+
+from __future__ import annotations
+
+from planners.astar import AStar
+from planners.costmap import Costmap
+from planners.engine import Engine, Found, Pose, SearchSettings
+from planners.jps import JPS
+
+
+class AutoSettings(SearchSettings):
+    """What the choice of the fastest planner can be told."""
+
+
+class Auto:
+    """Jump point search where every metre costs the same, A* where some are dearer.
+
+    Both bring a route of the least cost; the route's `planner` names the one that was chosen.
+    """
+
+    def __init__(self, costmap: Costmap) -> None:
+        engine: type[Engine] = JPS if costmap.uniform else AStar
+        self.engine = engine(costmap)
+        self.name = self.engine.name
+
+    def search(self, start: Pose, goal: Pose, settings: AutoSettings) -> Found | None:
+        """Return the route of least cost, or None if there is none.
+
+        Raises
+        ------
+        TimeLimitError
+            Time ran out; with a limit of 0, always.
+        """
+        return self.engine.search(start, goal, SearchSettings(time_limit=settings.time_limit))

@@ -1,0 +1,159 @@
+"""Planning again and again on a map that grows, from a robot that moves."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from groundmap.arrays import Floats, Ints
+from planners.answers import answer, check_on_map, check_space
+from planners.costmap import Costmap
+from planners.dstar_lite import DStarLite, DStarLiteSettings
+from planners.enclosure import enclosed
+from planners.errors import Point, ProblemError
+from planners.problem import PlanningProblem
+from planners.route import Route
+
+
+class IncrementalPlanner:
+    """Routes to one goal, on a live map, from wherever the robot is.
+
+    Each route is what `planners.plan` would return at that moment (of routes that cost the same,
+    perhaps another), but only what changed since the last one is worked out again, by D* Lite.
+
+    Parameters
+    ----------
+    problem : PlanningProblem
+        Its grid is the live map; its start, where the robot is at first.
+    **settings
+        Those of `planners.dstar_lite.DStarLiteSettings`.
+
+    Raises
+    ------
+    ProblemError
+        A 3-D map.
+    SettingsError
+        An unknown setting, or one out of its range (from `groundmap.errors`).
+
+    Examples
+    --------
+    >>> from groundmap import ConfidenceGrid
+    >>> grid = ConfidenceGrid(resolution=0.5)
+    >>> grid.fuse(np.array([0, 0]), np.full((64, 64), -1.0, dtype=np.float32))
+    >>> planner = IncrementalPlanner(
+    ...     PlanningProblem(grid, start=(2, 10.25), goal=(30.25, 10.25), footprint=0.9)
+    ... )
+    >>> planner.plan().length
+    28.25
+    >>> grid.fuse(np.array([20, 30]), np.full((1, 1), 1.0, dtype=np.float32))
+    >>> planner.update([[20, 30]])
+    >>> round(planner.plan(start=(5.25, 10.25)).length, 2)
+    26.24
+    """
+
+    def __init__(self, problem: PlanningProblem, **settings: Any) -> None:
+        if problem.grid.ndim != 2:
+            raise ProblemError("grid", "a 2-D map", f"one of {problem.grid.ndim}-D")
+        self.problem = problem
+        self.settings = DStarLiteSettings(**settings)
+        self._costmap: Costmap | None = None
+        self._engine: DStarLite | None = None
+
+    def update(self, changed: npt.ArrayLike) -> None:
+        """Take over cells of the grid that changed; only what they touch is worked out again.
+
+        Parameters
+        ----------
+        changed : array_like of int, shape (n, 2)
+            Cells [row, col] of the grid, as `groundmap.GroundMapper.integrate` returns them;
+            cells that the map did not have before among them.
+        """
+        if self._costmap is not None:
+            self._costmap = self._costmap.updated(changed)
+
+    def plan(
+        self,
+        start: Sequence[float] | Floats | None = None,
+        goal: Sequence[float] | Floats | None = None,
+    ) -> Route:
+        """Return the route on the map as it is now, which the audit passed.
+
+        Parameters
+        ----------
+        start : sequence of float, optional
+            Where the robot is now: x, y [m] and optionally yaw [rad]; where it was unless told.
+        goal : sequence of float, optional
+            Another goal. The search then begins anew.
+
+        Raises
+        ------
+        ProblemError
+            A place that is not 2 or 3 finite numbers.
+        OutsideMapError, NonFreeError, UnknownSpaceError
+            Start or goal is no place for the footprint.
+        EnclosedError
+            No route joins them.
+        TimeLimitError
+            Time ran out. The next call goes on where this one ended.
+        AuditError
+            The route keeps not what was asked: cells that changed were not said with `update`,
+            or a bug in the planner.
+        """
+        began = time.perf_counter()
+        self.problem = replace(
+            self.problem,
+            start=self.problem.start if start is None else start,
+            goal=self.problem.goal if goal is None else goal,
+        )
+        check_on_map(self.problem)
+        costmap = self._costmap = self._costmap_now()
+        check_space(costmap, "start", self.problem.start_xy)
+        check_space(costmap, "goal", self.problem.goal_xy)
+        engine = self._engine_on(costmap)
+        found = engine.search(self.problem.start_xy, self.problem.goal_xy, self.settings)
+        if found is None:
+            raise enclosed(costmap)
+        seconds = time.perf_counter() - began
+        return answer(costmap, found, planner=engine.name, seconds=seconds)
+
+    def _engine_on(self, costmap: Costmap) -> DStarLite:
+        if self._engine is None:
+            self._engine = DStarLite(costmap)
+        elif self._engine.costmap.costs is not costmap.costs:  # else only the start moved
+            self._engine.update(costmap)
+        return self._engine
+
+    def _costmap_now(self) -> Costmap:
+        """Return the costmap of the problem as it is now: what is cleared moves with the start."""
+        before = self._costmap
+        if before is None:
+            return Costmap.of(self.problem)
+        here = replace(before, problem=self.problem)
+        if _ends(before.problem) == _ends(self.problem):
+            return here
+        cells = np.concatenate([_unknown_cells(before), _unknown_cells(here)])
+        return here.updated(cells + before.lower_cell)
+
+
+def _ends(problem: PlanningProblem) -> tuple[Point, Point]:
+    return problem.start_xy, problem.goal_xy
+
+
+def _unknown_cells(costmap: Costmap) -> Ints:
+    """Return cells near the start, and that of the goal, if unknown or beyond the window."""
+    problem, window = costmap.problem, costmap.window
+    reach = problem.clear_radius if problem.clear_start else 0.0
+    corners = [np.array(problem.start_xy) - reach, np.array(problem.start_xy) + reach]
+    first, last = window.world_to_cell(corners)
+    around = np.argwhere(np.ones(last - first + 1)) + first
+    cells = np.concatenate([around, window.world_to_cell(problem.goal_xy)])
+    inside = window.contains(cells)
+    known = np.zeros(len(cells), dtype=np.bool_)
+    known[inside] = window.count[tuple(cells[inside].T)] > 0
+    unknown: Ints = cells[~known]
+    return unknown

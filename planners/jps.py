@@ -1,0 +1,160 @@
+"""Jump point search: the routes of A* where all metres cost the same, found by fewer steps."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from groundmap.arrays import Bools, Ints
+from planners.costmap import Costmap
+from planners.ends import Ends, ends_of, waypoints_through
+from planners.engine import Clock, Found, Pose, SearchSettings
+from planners.errors import ProblemError
+from planners.kernels.astar import EXHAUSTED, EXPANDED, FAR, FOUND, HEAP_FULL, ROOT, SIZE, TARGET
+from planners.kernels.astar import estimate as estimated
+from planners.kernels.heap import push
+from planners.kernels.jps import CAME, MARK, advance, trace
+from planners.kernels.jps_jumps import Jumps
+from planners.kernels.jps_table import fill_table
+
+SLICE = 10_000  # expansions between two looks at the clock: about 10 ms
+FIRST_ROOM = 1 << 14  # heap entries to begin with
+
+
+class JPSSettings(SearchSettings):
+    """What jump point search can be told."""
+
+
+class JPSPlusSettings(SearchSettings):
+    """What jump point search with a table can be told."""
+
+
+class JPS:
+    """Jump point search over A*'s moves (Harabor and Grastien 2011), 64 cells at a time (2014).
+
+    Examples
+    --------
+    >>> from groundmap import ConfidenceGrid
+    >>> from planners.problem import PlanningProblem
+    >>> grid = ConfidenceGrid(resolution=1.0)
+    >>> grid.fuse(np.array([0, 0]), np.full((64, 64), -1.0, dtype=np.float32))
+    >>> problem = PlanningProblem(grid, start=(5.5, 5.5), goal=(9.5, 8.5), footprint=2.0)
+    >>> found = JPS(Costmap.of(problem)).search(problem.start, problem.goal, JPSSettings())
+    >>> found.waypoints.tolist(), found.expanded
+    ([[5.5, 5.5], [8.5, 8.5], [9.5, 8.5]], 2)
+    """
+
+    name: ClassVar[str] = "jps"
+
+    def __init__(self, costmap: Costmap) -> None:
+        if not costmap.uniform:
+            raise ProblemError(
+                "planner",
+                f"uniform costs, which {self.name!r} needs",
+                "cells that cost more than others",
+                hint="Take 'astar', which heeds them.",
+            )
+        self.costmap = costmap
+        self.labels = np.zeros((costmap.stand.size, 2), dtype=np.int64)
+        self.query = 0
+        self.heap = np.empty((FIRST_ROOM, 2), dtype=np.int64)
+        self.jumps: Jumps | None = None
+
+    def look_up(self) -> Jumps:
+        """Return what jumps are looked up in: made for the first search, kept for the others."""
+        return stops_of(self.costmap.stand)
+
+    def search(self, start: Pose, goal: Pose, settings: SearchSettings) -> Found | None:
+        """Return the shortest route from start to goal, or None if there is none.
+
+        Raises
+        ------
+        TimeLimitError
+            Time ran out; with a limit of 0, always.
+        """
+        clock = Clock(self.name, settings.time_limit)
+        clock.check(0)
+        ends = ends_of(self.costmap, start, goal)
+        if ends.direct:
+            return Found(waypoints_through(self.costmap, start, goal, np.empty((0, 2), int)), 0)
+        if self.jumps is None:
+            self.jumps = self.look_up()
+        state = self._seed(ends)
+        status = EXHAUSTED if len(ends.targets) == 0 else -1
+        while status not in (FOUND, EXHAUSTED):
+            clock.check(int(state[EXPANDED]))
+            status = self._advance(self.jumps, ends.targets, state)
+        if status == EXHAUSTED:
+            return None
+        turns = trace(self.labels, self.costmap.width, int(state[TARGET]))[::-1]
+        cells = np.column_stack(np.divmod(turns, self.costmap.width))
+        waypoints = waypoints_through(self.costmap, start, goal, cells)
+        return Found(waypoints, int(state[EXPANDED]))
+
+    def _seed(self, ends: Ends) -> Ints:
+        """Begin a query: put the sources on an empty heap."""
+        self.query += 1
+        fresh = MARK * self.query
+        state = np.array([0, FAR, -1, 0, fresh], dtype=np.int64)
+        for row, col, cost in ends.sources.tolist():
+            node = row * self.costmap.width + col
+            self.labels[node] = cost, fresh + (ROOT << CAME)
+            h = estimated(row, col, ends.targets)
+            state[SIZE] = push(self.heap, state[SIZE], cost + h, h, node)
+        return state
+
+    def _advance(self, jumps: Jumps, targets: Ints, state: Ints) -> int:
+        status = advance(self.costmap.moves, jumps, targets, self.labels, self.heap, state, SLICE)
+        if status == HEAP_FULL:
+            self.heap = np.concatenate([self.heap, np.empty_like(self.heap)])
+        return status
+
+
+class JPSPlus(JPS):
+    """Jump point search with a table of all jumps (Rabin 2015), for many queries on one map.
+
+    The first search makes the table: 16 bytes for each cell.
+    """
+
+    name = "jps_plus"
+
+    def look_up(self) -> Jumps:
+        """Return the table of jumps."""
+        moves = self.costmap.moves
+        kind = np.int16 if max(moves.shape) <= np.iinfo(np.int16).max else np.int32
+        table: Jumps = np.empty((*moves.shape, 8), dtype=kind)
+        fill_table(moves, table)
+        return table
+
+
+def stops_of(stand: Bools) -> Ints:
+    """Return the bitmap of stops that is described in `planners.kernels.jps_jumps`.
+
+    Parameters
+    ----------
+    stand : ndarray of bool, shape (rows, cols)
+
+    Examples
+    --------
+    >>> stops_of(np.array([[False, True, False], [True, True, True]]))[1].tolist()
+    [-6, -8]
+    """
+    ways = [stand, stand[:, ::-1], stand.T, stand[::-1].T]
+    return np.concatenate([_stops_ahead(lines) for lines in ways])
+
+
+def _stops_ahead(lines: Bools) -> Ints:
+    """Return stops and walls on the way along axis 1, shape (words, 2)."""
+    count, length = lines.shape
+    padded = np.zeros((count, (length // 64 + 1) * 64), dtype=np.bool_)
+    padded[:, :length] = lines
+    stand = np.packbits(padded, axis=1, bitorder="little").view("<u8")
+    before = stand << np.uint64(1)
+    before[:, 1:] |= stand[:, :-1] >> np.uint64(63)
+    opens = stand & ~before  # a cell after a wall: what stands beside it is a jump point
+    stops = ~stand
+    stops[1:] |= opens[:-1]
+    stops[:-1] |= opens[1:]
+    pairs = np.stack([stops, ~stand], axis=-1)
+    return pairs.astype(np.uint64).view(np.int64).reshape(-1, 2)

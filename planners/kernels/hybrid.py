@@ -1,0 +1,353 @@
+"""Hybrid A*: a search over poses, in slices, so that Python can watch the clock in between.
+
+A node is a pose that motions of constant curvature lead to exactly; of all poses in one cell and
+one bin of headings, only the cheapest is kept. Now and then the shortest curve from a node to the
+goal, heedless of obstacles, is tried: if it is clear, it is a whole route. (Dolgov, Thrun,
+Montemerlo, Diebel 2010.) Positions and lengths are in cells, costs too.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from groundmap.arrays import Bools, Bytes, Floats, Ints, Ints32
+from planners.kernels.astar import FAR, ONE
+from planners.kernels.curves import SEGMENTS, along, dubins_word, reeds_shepp_word, wrap
+from planners.kernels.footprint import Ground, Shape, cuts, motion_clear
+from planners.kernels.heap import drop_top, push, top_node
+from planners.kernels.hybrid_field import SIDE, UNREACHED, Field, distance_of
+
+SLICE_DONE, FOUND, EXHAUSTED, FULL = range(4)  # what `advance` returns
+SIZE, COUNT, EXPANDED, WAIT, BEST, LAST = range(6)  # entries of `state`
+STATE_SIZE = 6
+TURNS = 3  # motions of one gear: to the right, straight, to the left; then those backwards
+ROOT = -1
+DETOUR = 7.3  # [radii] no curve, even forward only, needs more beyond the straight distance
+HASH = 0x9E3779B97F4A7C15 - 2**64  # odd; the golden ratio spreads keys that are close together
+
+
+class Drive(NamedTuple):
+    """How the robot moves, and what that costs."""
+
+    step: float  #: length of a motion
+    curvature: float  #: at the steering's stop
+    gears: int  #: 1: forward only; 2: both ways
+    reverse: float  #: what a cell's side driven backwards costs
+    cusp: float  #: what a change of gear costs
+    steer: float  #: what turning the steering from stop to stop costs
+    bins: int  #: of headings
+    ratio: float  #: a curve is tried after as many nodes as steps remain, divided by this
+    weight: float  #: how much more than itself the guess of what is left counts
+
+
+class Prices(NamedTuple):
+    """What a length costs where, as a multiple of itself."""
+
+    costs: Bytes  #: shape (rows, cols)
+    factors: Floats  #: shape (256,) by cost; shape (1,) if every cell's is 1
+
+
+class Nodes(NamedTuple):
+    """The poses reached so far, and a table of them by cell and bin (linear probing)."""
+
+    poses: Floats  #: shape (room, 3) [cells; rad]
+    costs: Floats  #: shape (room,); so far
+    guesses: Floats  #: shape (room,); of the cost still to come
+    keys: Ints  #: shape (room,); cell * bins + bin
+    parents: Ints32  #: shape (room,)
+    motions: Ints32  #: shape (room,); that led here, or `ROOT`
+    closed: Bools  #: shape (room,)
+    table: Ints32  #: shape (a power of two,); nodes, or -1
+
+
+class Shot(NamedTuple):
+    """The curve that ends the best route so far; lengths in turning radii."""
+
+    lengths: Floats  #: shape (5,)
+    turns: Ints  #: shape (5,)
+
+
+@njit(cache=True, nogil=True)
+def begin(
+    ground: Ground,
+    field: Field,
+    drive: Drive,
+    start: Floats,
+    goal: Floats,
+    nodes: Nodes,
+    heap: Ints,
+) -> Ints:
+    """Put the start on an empty heap and return the state; nothing waits if it is fenced in.
+
+    Parameters
+    ----------
+    start, goal : ndarray, shape (3,) [cells; rad]
+        Both within the map.
+    """
+    state = np.zeros(STATE_SIZE, dtype=np.int64)
+    state[BEST], state[LAST] = FAR, -1
+    nodes.table[:] = -1
+    row, col = math.floor(start[1]), math.floor(start[0])
+    far = distance_of(field, ground.blocked.shape[1], row * ground.blocked.shape[1] + col)
+    if far == UNREACHED:
+        return state
+    key = _key(ground.blocked.shape[1], drive.bins, start[0], start[1], start[2])
+    guess = _guess(drive, goal, start[0], start[1], start[2], far / SIDE)
+    nodes.table[_slot(nodes.table, nodes.keys, key)] = 0
+    nodes.poses[0] = start
+    nodes.costs[0], nodes.guesses[0], nodes.keys[0] = 0.0, guess, key
+    nodes.parents[0], nodes.motions[0], nodes.closed[0] = ROOT, ROOT, False
+    state[COUNT] = 1
+    state[SIZE] = push(heap, 0, round(drive.weight * guess * ONE), round(guess * ONE), 0)
+    return state
+
+
+@njit(cache=True, nogil=True)
+def advance(
+    ground: Ground,
+    shape: Shape,
+    field: Field,
+    prices: Prices,
+    drive: Drive,
+    goal: Floats,
+    nodes: Nodes,
+    heap: Ints,
+    state: Ints,
+    shot: Shot,
+    budget: int,
+) -> int:
+    """Expand up to `budget` nodes.
+
+    Returns
+    -------
+    int
+        `FOUND`, `EXHAUSTED`, `SLICE_DONE`, or `FULL` (call again with more room).
+    """
+    end, motions = state[EXPANDED] + budget, TURNS * drive.gears
+    while state[SIZE] > 0 and heap[0, 0] < state[BEST]:
+        if state[EXPANDED] >= end:
+            return SLICE_DONE
+        if (
+            state[SIZE] + motions > len(heap)
+            or state[COUNT] + motions > len(nodes.costs)
+            or 2 * (state[COUNT] + motions) > len(nodes.table)
+        ):
+            return FULL
+        node = top_node(heap)
+        state[SIZE] = drop_top(heap, state[SIZE])
+        if nodes.closed[node]:  # it came out before, at a lower cost
+            continue
+        nodes.closed[node] = True
+        state[EXPANDED] += 1
+        state[WAIT] -= 1
+        if state[WAIT] <= 0:
+            _shoot(ground, shape, prices, drive, goal, nodes, node, state, shot)
+            state[WAIT] = int(nodes.guesses[node] / (drive.step * drive.ratio))
+        for motion in range(motions):
+            _try(ground, shape, field, prices, drive, goal, nodes, heap, state, node, motion)
+    return FOUND if state[BEST] < FAR else EXHAUSTED
+
+
+@njit(cache=True, nogil=True)
+def refile(nodes: Nodes, count: int) -> None:
+    """Enter the first `count` nodes in an empty table."""
+    nodes.table[:] = -1
+    for node in range(count):
+        nodes.table[_slot(nodes.table, nodes.keys, nodes.keys[node])] = node
+
+
+@njit(cache=True, nogil=True)
+def steering(motion: int) -> tuple[int, int]:
+    """Return the gear of a motion, 1 or -1, and its turn: 1 to the left, 0 or -1."""
+    return 1 if motion < TURNS else -1, motion % TURNS - 1
+
+
+@njit(cache=True, nogil=True)
+def pieces(drive: Drive, length: float) -> int:
+    """Return into how many motions a segment of a curve is cut."""
+    return max(1, math.ceil(abs(length) / drive.step))
+
+
+@njit(cache=True, nogil=True)
+def driven(shape: Shape, start: Floats, curvatures: Floats, lengths: Floats) -> Floats:
+    """Return the poses along motions, as `motion_clear` cuts them, shape (n, 3)."""
+    total = 1
+    for i in range(len(lengths)):
+        total += cuts(shape, curvatures[i], lengths[i])
+    poses = np.empty((total, 3))
+    poses[0] = start
+    at = 1
+    x, y, yaw = start[0], start[1], start[2]
+    for i in range(len(lengths)):
+        steps = cuts(shape, curvatures[i], lengths[i])
+        for j in range(1, steps + 1):
+            to_x, to_y, to_yaw = along(x, y, yaw, curvatures[i], lengths[i] * j / steps)
+            poses[at, 0], poses[at, 1], poses[at, 2] = to_x, to_y, to_yaw
+            at += 1
+        x, y, yaw = poses[at - 1]
+    return poses
+
+
+@njit(cache=True, nogil=True)
+def _try(
+    ground: Ground,
+    shape: Shape,
+    field: Field,
+    prices: Prices,
+    drive: Drive,
+    goal: Floats,
+    nodes: Nodes,
+    heap: Ints,
+    state: Ints,
+    node: int,
+    motion: int,
+) -> None:
+    """Drive one motion from a node, and keep where it leads if that is worth it."""
+    gear, turn = steering(motion)
+    from_x, from_y, from_yaw = nodes.poses[node]
+    curvature, length = turn * drive.curvature, gear * drive.step
+    x, y, yaw = along(from_x, from_y, from_yaw, curvature, length)
+    rows, cols = ground.blocked.shape
+    if not (0.0 <= x < cols and 0.0 <= y < rows):
+        return
+    cost = nodes.costs[node] + _change(drive, nodes.motions[node], gear, turn)
+    cost += _price(
+        prices.costs, prices.factors, drive.reverse, from_x, from_y, from_yaw, curvature, length
+    )
+    key = _key(cols, drive.bins, x, y, yaw)
+    slot = _slot(nodes.table, nodes.keys, key)
+    other = nodes.table[slot]
+    if other >= 0 and (nodes.closed[other] or cost >= nodes.costs[other]):
+        return
+    far = distance_of(field, cols, math.floor(y) * cols + math.floor(x))
+    if far == UNREACHED or (cost + far / SIDE) * ONE >= state[BEST]:
+        return
+    if not motion_clear(ground, shape, from_x, from_y, from_yaw, curvature, length):
+        return
+    if other < 0:
+        other = state[COUNT]
+        state[COUNT] += 1
+        nodes.table[slot] = other
+    guess = _guess(drive, goal, x, y, yaw, far / SIDE)
+    nodes.poses[other, 0], nodes.poses[other, 1], nodes.poses[other, 2] = x, y, wrap(yaw)
+    nodes.costs[other], nodes.guesses[other], nodes.keys[other] = cost, guess, key
+    nodes.parents[other], nodes.motions[other], nodes.closed[other] = node, motion, False
+    total = round((cost + drive.weight * guess) * ONE)
+    state[SIZE] = push(heap, state[SIZE], total, round(guess * ONE), other)
+
+
+@njit(cache=True, nogil=True)
+def _shoot(
+    ground: Ground,
+    shape: Shape,
+    prices: Prices,
+    drive: Drive,
+    goal: Floats,
+    nodes: Nodes,
+    node: int,
+    state: Ints,
+    shot: Shot,
+) -> None:
+    """Try the curve from a node to the goal; keep it if it is clear and makes the best route."""
+    lengths, turns = np.zeros(SEGMENTS), np.zeros(SEGMENTS, dtype=np.int64)
+    x, y, yaw = nodes.poses[node]
+    rest = _curve(drive, goal, x, y, yaw, lengths, turns)
+    if (nodes.costs[node] + rest) * ONE >= state[BEST]:
+        return
+    total, before = nodes.costs[node], nodes.motions[node]
+    for i in range(SEGMENTS):
+        if lengths[i] == 0.0:
+            continue
+        curvature, length = turns[i] * drive.curvature, lengths[i] / drive.curvature
+        gear = 1 if length > 0.0 else -1
+        total += _change(drive, before, gear, turns[i])
+        before = turns[i] + 1 + (0 if gear > 0 else TURNS)
+        count = pieces(drive, length)
+        for _ in range(count):
+            if not motion_clear(ground, shape, x, y, yaw, curvature, length / count):
+                return
+            total += _price(
+                prices.costs, prices.factors, drive.reverse, x, y, yaw, curvature, length / count
+            )
+            x, y, yaw = along(x, y, yaw, curvature, length / count)
+    if total * ONE < state[BEST]:
+        state[BEST], state[LAST] = round(total * ONE), node
+        shot.lengths[:], shot.turns[:] = lengths, turns
+
+
+@njit(cache=True, nogil=True)
+def _curve(
+    drive: Drive, goal: Floats, x: float, y: float, yaw: float, lengths: Floats, turns: Ints
+) -> float:
+    """Find the cheapest curve to the goal, heedless of obstacles; return its cost."""
+    dx, dy = (goal[0] - x) * drive.curvature, (goal[1] - y) * drive.curvature
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    u, v, turn = cosine * dx + sine * dy, cosine * dy - sine * dx, wrap(goal[2] - yaw)
+    if drive.gears == 1:
+        return dubins_word(u, v, turn, lengths, turns) / drive.curvature
+    cusp = drive.cusp * drive.curvature
+    return reeds_shepp_word(u, v, turn, drive.reverse, cusp, lengths, turns) / drive.curvature
+
+
+@njit(cache=True, nogil=True)
+def _guess(drive: Drive, goal: Floats, x: float, y: float, yaw: float, far: float) -> float:
+    """Return the larger of the way around obstacles and the way that the steering allows."""
+    if far >= math.hypot(goal[0] - x, goal[1] - y) + DETOUR / drive.curvature:
+        return far
+    lengths, turns = np.empty(SEGMENTS), np.empty(SEGMENTS, dtype=np.int64)
+    return max(far, _curve(drive, goal, x, y, yaw, lengths, turns))
+
+
+@njit(cache=True, nogil=True)
+def _change(drive: Drive, motion: int, gear: int, turn: int) -> float:
+    """Return what it costs to go on after a motion in another gear or with another steering."""
+    if motion == ROOT:
+        return 0.0
+    gear_before, turn_before = steering(motion)
+    cost = 0.5 * drive.steer * abs(turn - turn_before)
+    return cost + drive.cusp if gear != gear_before else cost
+
+
+@njit(cache=True, nogil=True)
+def _price(
+    costs: Bytes,
+    factors: Floats,
+    reverse: float,
+    x: float,
+    y: float,
+    yaw: float,
+    curvature: float,
+    length: float,
+) -> float:
+    """Return what a motion costs: the cells half-way and at its end count for half of it each."""
+    cost = length if length > 0.0 else -reverse * length
+    if len(factors) == 1:
+        return cost
+    rows, cols = costs.shape
+    total = 0.0
+    for part in (0.5, 1.0):
+        to_x, to_y, _ = along(x, y, yaw, curvature, part * length)
+        row = min(max(math.floor(to_y), 0), rows - 1)
+        col = min(max(math.floor(to_x), 0), cols - 1)
+        total += 0.5 * factors[costs[row, col]]
+    return cost * total
+
+
+@njit(cache=True, nogil=True)
+def _key(cols: int, bins: int, x: float, y: float, yaw: float) -> int:
+    turned = round(yaw / (2.0 * math.pi) * bins) % bins
+    return int((math.floor(y) * cols + math.floor(x)) * bins + turned)
+
+
+@njit(cache=True, nogil=True)
+def _slot(table: Ints32, keys: Ints, key: int) -> int:
+    """Return the place of a key in the table: its node's, or the free one where it belongs."""
+    mask = len(table) - 1
+    slot = ((key * HASH) >> 20) & mask
+    while table[slot] >= 0 and keys[table[slot]] != key:
+        slot = (slot + 1) & mask
+    return slot

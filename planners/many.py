@@ -1,0 +1,177 @@
+"""Many queries on one map: what they share is worked out once, and threads answer them."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from queue import SimpleQueue
+from typing import Any, NamedTuple, TypeAlias
+
+from groundmap.arrays import Floats
+from planners.answers import answer, check_on_map, check_space
+from planners.costmap import Costmap
+from planners.enclosure import enclosed
+from planners.engine import Engine, SearchSettings
+from planners.errors import NoRouteError, ProblemError
+from planners.problem import PlanningProblem
+from planners.registry import Planner, named
+from planners.route import Route
+
+Pair: TypeAlias = Sequence[Sequence[float] | Floats] | Floats  #: a start and a goal
+
+
+class _Desk(NamedTuple):
+    """What answers queries, one at a time in each thread."""
+
+    costmap: Costmap
+    engines: SimpleQueue[Engine]
+    settings: SearchSettings
+    audited: bool
+
+
+def plan_many(
+    problem: PlanningProblem,
+    pairs: Iterable[Pair],
+    planner: str = "auto",
+    *,
+    threads: int | None = None,
+    audit: bool = True,
+    **settings: Any,
+) -> list[Route | NoRouteError]:
+    """Return for each start and goal what `plan` would return, or the exception it would raise.
+
+    Costmap and engines are made once; the searches of different threads run at the same time.
+
+    Parameters
+    ----------
+    problem : PlanningProblem
+        Says all but the starts and goals. With ``clear_start``, the unknown cells near *its* start
+        count as free, for every query, and no others (as with ``cleared_at`` at that place).
+    pairs : iterable of (start, goal)
+        Each x, y [m, map] and optionally yaw [rad].
+    planner : str, default "auto"
+        A name in `PLANNERS`.
+    threads : int, optional
+        As many as the machine has processors unless told. The routes don't depend on it.
+    audit : bool, default True
+        Whether every route is audited, as those of `plan` are. On maps of 512 x 512 cells this
+        takes about half as long as all the rest; an unaudited route's `audit` is "skipped".
+    **settings
+        The planner's settings; a time limit is for each query.
+
+    Returns
+    -------
+    list of Route or NoRouteError
+        In the order of the pairs. Only what is wrong with one query is in the list; what is
+        wrong with all of them is raised.
+
+    Raises
+    ------
+    ProblemError
+        No planner of that name, or a pair that is not two places: its number is in the sentence.
+    SettingsError
+        An unknown setting, or one out of its range (from `groundmap.errors`).
+    AuditError
+        A planner's route keeps not what was asked: a bug in the planner.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from groundmap import ConfidenceGrid
+    >>> grid = ConfidenceGrid(resolution=0.5)
+    >>> grid.fuse(np.array([0, 0]), np.full((64, 64), -1.0, dtype=np.float32))
+    >>> problem = PlanningProblem(grid, start=(2, 2), goal=(30, 6), footprint=0.9)
+    >>> pairs = [((2, 2.25), (30, 2.25)), ((2, 2), (31.9, 2)), ((2, 9.25), (9, 9.25))]
+    >>> for route in plan_many(problem, pairs, "astar"):
+    ...     print(route.length if isinstance(route, Route) else type(route).__name__)
+    28.0
+    UnknownSpaceError
+    7.0
+    """
+    chosen = named(planner)
+    options = chosen.settings(**settings)
+    problems = _problems(problem, pairs)
+    workers = min(_threads(threads), max(len(problems), 1))
+    if not problems:
+        return []
+    costmap = Costmap.of(problems[0])
+    for name in ("moves", "steps", "clearance"):  # worked out by one thread, not by each
+        getattr(costmap, name)
+    desk = _Desk(costmap, _engines(chosen, costmap, workers), options, audit)
+    with ThreadPoolExecutor(workers) as pool:
+        return list(pool.map(lambda asked: _answer(desk, asked), problems))
+
+
+def _problems(problem: PlanningProblem, pairs: Iterable[Pair]) -> list[PlanningProblem]:
+    """Return a problem for each pair; what they clear is the same."""
+    if problem.grid.ndim != 2:
+        raise ProblemError(
+            "grid", "a 2-D map", f"a {problem.grid.ndim}-D one", hint="Use `plan` for each pair."
+        )
+    problems = []
+    for i, pair in enumerate(pairs):
+        try:
+            start, goal = pair
+        except (TypeError, ValueError) as error:
+            raise ProblemError(f"pairs[{i}]", "a start and a goal", repr(pair)) from error
+        try:
+            asked = replace(problem, start=start, goal=goal, cleared_at=problem.clear_place)
+        except ProblemError as error:
+            raise ProblemError(f"pairs[{i}], {error.name}", error.expected, error.got) from error
+        problems.append(asked)
+    return problems
+
+
+def _threads(threads: int | None) -> int:
+    if threads is None:  # Python 3.13 knows how many of them this process may use
+        return getattr(os, "process_cpu_count", os.cpu_count)() or 1
+    if not isinstance(threads, int) or threads < 1:
+        raise ProblemError("threads", "a whole number of 1 or more", repr(threads))
+    return threads
+
+
+def _engines(planner: Planner, costmap: Costmap, count: int) -> SimpleQueue[Engine]:
+    """Return engines; those that can make a twin of themselves share what they worked out."""
+    first = planner.engine(costmap)
+    twin = getattr(first, "twin", None) or (lambda: planner.engine(costmap))
+    engines: SimpleQueue[Engine] = SimpleQueue()
+    engines.put(first)
+    for _ in range(count - 1):
+        engines.put(twin())
+    return engines
+
+
+def _answer(desk: _Desk, problem: PlanningProblem) -> Route | NoRouteError:
+    engine = desk.engines.get()
+    try:
+        return _route(desk, engine, problem)
+    except NoRouteError as error:
+        return error.with_traceback(None)  # which would keep the engine's arrays alive
+    finally:
+        desk.engines.put(engine)
+
+
+def _route(desk: _Desk, engine: Engine, problem: PlanningProblem) -> Route:
+    began = time.perf_counter()
+    costmap = _posed(desk.costmap, problem)
+    check_on_map(problem)
+    check_space(costmap, "start", problem.start_xy)
+    check_space(costmap, "goal", problem.goal_xy)
+    found = engine.search(tuple(problem.start), tuple(problem.goal), desk.settings)
+    if found is None:
+        raise enclosed(costmap)
+    seconds = time.perf_counter() - began
+    if desk.audited:
+        return answer(costmap, found, planner=engine.name, seconds=seconds)
+    route = Route.along(costmap, found, planner=engine.name, seconds=seconds)
+    return replace(route, audit="skipped")
+
+
+def _posed(costmap: Costmap, problem: PlanningProblem) -> Costmap:
+    """Return the costmap of another query, with all that was worked out about the map."""
+    posed = replace(costmap, problem=problem)
+    vars(posed).update(vars(costmap) | {"problem": problem})
+    return posed
