@@ -10,10 +10,8 @@ from groundmap.arrays import Bools
 from planners.answers import costmap_of
 from planners.costmap import Costmap
 from planners.errors import EnclosedError, Place, Point, Turning
+from planners.fields import reachable
 from planners.footprint import Footprint
-from planners.kernels.flood import flood
-from planners.lattice import allowed_moves
-from planners.links import links
 from planners.problem import PlanningProblem
 from planners.widest import WidestRoute, widest_way
 
@@ -36,7 +34,7 @@ def enclosed(costmap: Costmap, *, needed: float | None = None) -> EnclosedError:
     fenced = from_start if place == "start" else from_goal
     nearest, distance = _nearest(costmap, from_start)
     widest = widest_way(costmap, seen_from=place)
-    turning: Turning = "heeded" if needed is not None else "anyhow"
+    turning: Turning = "none" if problem.shape.is_disc else "anyhow"
     return EnclosedError(
         place,
         area=float(fenced.sum()) * resolution**2,
@@ -45,7 +43,7 @@ def enclosed(costmap: Costmap, *, needed: float | None = None) -> EnclosedError:
         widest_gap=0.0 if widest is None else widest.width,
         bottleneck=None if widest is None else widest.bottleneck,
         needed=2.0 * radius,
-        turning="none" if problem.shape.is_disc else turning,
+        turning=turning if needed is None else "heeded",
     )
 
 
@@ -83,24 +81,6 @@ def widest_route(problem: PlanningProblem) -> WidestRoute:
     if widest is None:
         raise enclosed(costmap)
     return widest
-
-
-def reachable(costmap: Costmap, xy: Point, *, radius: float) -> Bools:
-    """Return which cell centres can be reached from a place, shape (rows, cols).
-
-    Parameters
-    ----------
-    costmap : Costmap
-    xy : tuple of float [m, map]
-    radius : float [m]
-        Clearance to keep on the way.
-    """
-    same = radius == costmap.radius
-    moves = costmap.moves if same else allowed_moves(costmap.stand_for(radius))
-    cells = links(costmap, xy, radius=radius).cells
-    sources = cells[:, 0] * costmap.width + cells[:, 1]
-    mask: Bools = flood(moves.ravel(), costmap.width, sources)
-    return mask.reshape(costmap.blocked.shape)
 
 
 def _nearest(costmap: Costmap, reached: Bools) -> tuple[Point, float]:

@@ -9,6 +9,7 @@
     │   ├── NonFreeError             the footprint overlaps non-free space there
     │   ├── UnknownSpaceError        the footprint overlaps unknown or contested space there
     │   ├── EnclosedError            start or goal is fenced in
+    │   ├── SmoothingError           clearance allows no turns as wide as asked for
     │   └── TimeLimitError           time ran out before the search ended
     └── AuditError                   a planner's route that keeps not what was asked: a bug
 
@@ -190,10 +191,43 @@ your footprint needs 0.60 m.
         self.widest_gap, self.needed, self.bottleneck = widest_gap, needed, bottleneck
         self.turning = turning
         what = f"area of {area:.1f} m²" if len(nearest) == 2 else f"space of {area:.1f} m³"
+        way = _way(widest_gap, needed, bottleneck, turning)
+        if turning == "heeded" and widest_gap >= needed:  # nothing fences it in but its turns
+            super().__init__(f"no route that can be driven: {way}")
+            return
         super().__init__(
-            f"no route: the {place} is fenced in: an enclosed {what} around it; "
-            f"the reachable cell nearest to the goal is {_shown(nearest)}, {distance:.2f} m away"
-            f"{_gap(widest_gap, needed, bottleneck, turning)}."
+            f"no route: the {place} is fenced in: an enclosed {what} around it; the reachable "
+            f"cell nearest to the goal is {_shown(nearest)}, {distance:.2f} m away"
+            f"{'; ' if way else '.'}{way}"
+        )
+
+
+class SmoothingError(NoRouteError):
+    """There is a route, but none was found along it that turns as wide as was asked for.
+
+    Parameters
+    ----------
+    xy : tuple of float [m, map]
+        Where the line bends too much, or comes too near to what it must not touch.
+    turning_radius : float [m]
+        What was asked for.
+    possible : float [m]
+        The largest turning radius found to be possible along all of the line; 0 if none was.
+
+    Examples
+    --------
+    >>> print(SmoothingError((3.0, 1.5), turning_radius=1.5, possible=0.8))
+    smooth: the bend at (3.00, 1.50) can't be rounded with a turning radius of 1.50 m: clearance \
+allows about 0.80 m. Ask for less, or for a planner that plans with turns.
+    """
+
+    def __init__(self, xy: Point, *, turning_radius: float, possible: float) -> None:
+        self.xy, self.turning_radius, self.possible = xy, turning_radius, possible
+        allows = f"about {possible:.2f} m" if possible > 0 else "none that was tried"
+        super().__init__(
+            f"smooth: the bend at ({xy[0]:.2f}, {xy[1]:.2f}) can't be rounded with a turning "
+            f"radius of {turning_radius:.2f} m: clearance allows {allows}. "
+            "Ask for less, or for a planner that plans with turns."
         )
 
 
@@ -231,22 +265,20 @@ class AuditError(PlanningError):
         )
 
 
-def _gap(widest: float, needed: float, at: Point | None, turning: Turning) -> str:
+def _way(widest: float, needed: float, at: Point | None, turning: Turning) -> str:
     if math.isnan(widest):
         return ""
     if widest == 0:
-        return "; no way from start to goal exists, however narrow the footprint"
+        return "no way from start to goal exists, however narrow the footprint."
     has, needs = _apart(widest, needed)
-    way = f"; the widest way is {has} m wide{'' if at is None else f' at {_shown(at)}'}"
+    way = f"the widest way is {has} m wide{'' if at is None else f' at {_shown(at)}'}"
     footprint = "your footprint, turned anyhow," if turning == "anyhow" else "your footprint"
     if widest < needed:
-        return f"{way}, {footprint} needs {needs} m"
-    but = (
-        "there is no way to drive it along there"
-        if turning == "heeded"
-        else "not along cell centres: map with smaller cells"
-    )
-    return f"{way}, enough for what {footprint} needs, {needs} m, but {but}"
+        return f"{way}, {footprint} needs {needs} m."
+    enough = f"{way}, enough for what {footprint} needs, {needs} m, but"
+    if turning == "heeded":
+        return f"{enough} not for its turns. Turn in smaller circles, or leave it more room."
+    return f"{enough} not along cell centres: map with smaller cells."
 
 
 def _apart(a: float, b: float) -> tuple[str, str]:

@@ -117,11 +117,13 @@ def reachable(
     """
     costmap, xy = _costmap(space), _place("start", start)
     kept = costmap.radius if radius is None else radius
-    stand = costmap.stand_for(kept)
+    same = kept == costmap.radius
+    stand = costmap.stand if same else costmap.stand_for(kept)
+    moves = costmap.moves if same else allowed_moves(stand)
     cells = links(costmap, xy, radius=kept).cells
     rows, cols = cells[stand[tuple(cells.T)]].T
     sources = rows * costmap.width + cols
-    mask: Bools = flood(allowed_moves(stand).ravel(), costmap.width, sources)
+    mask: Bools = flood(moves.ravel(), costmap.width, sources)
     return mask.reshape(costmap.blocked.shape)
 
 

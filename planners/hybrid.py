@@ -10,12 +10,18 @@ from pydantic import Field
 
 from groundmap.arrays import Floats, Ints
 from planners.costmap import Costmap
-from planners.costs import MAX_NON_OBSTACLE
 from planners.engine import Clock, Found, Pose, SearchSettings
 from planners.errors import Place, ProblemError
-from planners.footprint import Footprint
-from planners.kernels.curves import SEGMENTS, wrap
-from planners.kernels.footprint import Ground, Shape, step_clear
+from planners.hybrid_parts import (
+    empty_nodes,
+    factors_of,
+    field_of,
+    ground_of,
+    no_shot,
+    shape_of,
+)
+from planners.kernels.curves import wrap
+from planners.kernels.footprint import step_clear
 from planners.kernels.hybrid import (
     COUNT,
     EXHAUSTED,
@@ -23,52 +29,54 @@ from planners.kernels.hybrid import (
     FOUND,
     FULL,
     LAST,
-    ROOT,
-    Drive,
+    STATE_SIZE,
     Nodes,
-    Prices,
     Shot,
     advance,
     begin,
     driven,
-    pieces,
     refile,
-    steering,
 )
-from planners.kernels.hybrid_field import BUCKETS, seed_field
-from planners.kernels.hybrid_field import Field as DistanceField
-from planners.lattice import allowed_moves
+from planners.kernels.hybrid_field import seed_field
+from planners.kernels.hybrid_motion import ROOT, Drive, Prices, pieces, steering
 
 SLICE = 1000  # expansions between two looks at the clock: about 20 ms
 FIRST_ROOM = 1 << 12  # nodes to begin with
-MITRE_LIMIT = 5.0  # of shapely and others that grow outlines: sharper corners are cut off
-BULGE = 1e-3  # [m] how far the footprint may leave the hulls of the poses it is checked at
 
 
 class HybridAStarSettings(SearchSettings):
     """What hybrid A* can be told."""
 
-    turning_radius: float = Field(1.0, gt=0, description="tightest turn of base_link [m]")
+    turning_radius: float = Field(
+        1.0, ge=0.01, le=1000, description="tightest turn of base_link [m]"
+    )
     motion: Literal["dubins", "reeds_shepp"] = Field(
         "reeds_shepp", description="forward only (dubins), or backwards too (reeds_shepp)"
     )
     reverse_penalty: float = Field(
-        2.0, ge=1, description="a metre driven backwards counts as that many"
+        2.0, ge=1, le=100, description="a metre driven backwards counts as that many"
     )
     gear_change_penalty: float = Field(
-        0.5, ge=0, description="a change between forward and backwards counts as that much [m]"
+        0.5,
+        ge=0,
+        le=1000,
+        description="a change between forward and backwards counts as that much [m]",
     )
     steering_penalty: float = Field(
-        0.1, ge=0, description="turning the steering from stop to stop counts as that much [m]"
+        0.1,
+        ge=0,
+        le=1000,
+        description="turning the steering from stop to stop counts as that much [m]",
     )
     heading_bins: int = Field(72, ge=8, le=720, description="headings told apart [bins per turn]")
     step_length: float | None = Field(
         None,
         gt=0,
+        le=100,
         description="length of a motion [m]; none, and the least: the diagonal of a cell",
     )
     analytic_ratio: float = Field(
-        3.5, gt=0, description="the higher, the more often the curve to the goal is tried"
+        3.5, gt=0, le=1000, description="the higher, the more often the curve to the goal is tried"
     )
     weight: float = Field(
         1.5,
@@ -87,8 +95,8 @@ class HybridAStar:
 
     Between two poses the footprint is taken to sweep the convex hull of its places in both (of a
     concave one: of each triangle of its constrained Delaunay triangulation), and where it turns,
-    up to a millimetre around that (`BULGE`), which no point of it ever leaves. A disc is checked
-    by the distance of the line. Where nothing turns, both are exact.
+    about a millimetre around that (`BULGE` in `planners.hybrid_parts`), which no point of it ever
+    leaves. A disc is checked by the distance of the line. Where nothing turns, both are exact.
 
     Examples
     --------
@@ -110,13 +118,15 @@ class HybridAStar:
         self.costmap = costmap
         size = costmap.window.resolution
         footprint = costmap.problem.shape
-        clearance = costmap.clearance / size
-        self.ground = Ground(costmap.blocked, _before(costmap), clearance)
-        self.shape = _shape(footprint, size)
-        self.field = _field(costmap, footprint)
-        self.prices = Prices(costmap.costs, _factors(costmap))
-        self.nodes = _nodes(FIRST_ROOM)
+        self.ground = ground_of(costmap)
+        self.shape = shape_of(footprint, size)
+        self.field = field_of(costmap, footprint)
+        self.prices = Prices(costmap.costs, factors_of(costmap))
+        self.nodes = empty_nodes(FIRST_ROOM)
         self.heap = np.empty((2 * FIRST_ROOM, 2), dtype=np.int64)
+        # Nothing waits: this only compiles, which may take long, where no clock is running yet.
+        drive, shot = _drive(HybridAStarSettings(), size), no_shot()
+        self._advance(drive, np.zeros(3), np.zeros(STATE_SIZE, dtype=np.int64), shot)
 
     def search(self, start: Pose, goal: Pose, settings: HybridAStarSettings) -> Found | None:
         """Return a route from start to goal, or None if there is none.
@@ -138,7 +148,7 @@ class HybridAStar:
         drive = _drive(settings, self.costmap.window.resolution)
         seed_field(self.field, int(b[1]) * self.costmap.width + int(b[0]))
         state = begin(self.ground, self.field, drive, a, b, self.nodes, self.heap)
-        shot = Shot(np.zeros(SEGMENTS), np.zeros(SEGMENTS, dtype=np.int64))
+        shot = no_shot()
         status = -1
         while status not in (FOUND, EXHAUSTED):
             clock.check(int(state[EXPANDED]))
@@ -179,7 +189,7 @@ class HybridAStar:
         if status == FULL:
             self.heap = np.concatenate([self.heap, np.empty_like(self.heap)])
             smaller, count = self.nodes, int(state[COUNT])
-            self.nodes = _nodes(2 * len(smaller.costs))
+            self.nodes = empty_nodes(2 * len(smaller.costs))
             for name in Nodes._fields[:-1]:
                 getattr(self.nodes, name)[:count] = getattr(smaller, name)[:count]
             refile(self.nodes, count)
@@ -237,72 +247,4 @@ def _drive(settings: HybridAStarSettings, size: float) -> Drive:
         bins=settings.heading_bins,
         ratio=settings.analytic_ratio,
         weight=settings.weight,
-    )
-
-
-def _shape(footprint: Footprint, size: float) -> Shape:
-    parts = [part / size for part in footprint.convex_parts()]
-    radius = footprint.radius / size
-    return Shape(
-        corners=np.concatenate([np.empty((0, 2)), *parts]),
-        begins=np.cumsum([0, *map(len, parts)]),
-        discs=footprint.covering_discs() / size,
-        radius=radius if footprint.is_disc else 0.0,
-        arm=0.0 if footprint.is_disc else radius,
-        spike=max(map(_spike, parts), default=1.0),
-        inscribed=footprint.inscribed_radius / size,
-        bulge=BULGE / size,
-    )
-
-
-def _spike(part: Floats) -> float:
-    """Return how much more than by d its sharpest corner moves out when a polygon is grown by d."""
-    sides = np.diff(np.concatenate([part, part[:1]]), axis=0)
-    turns = np.diff(np.unwrap(np.arctan2(*np.concatenate([sides, sides[:1]]).T[::-1])))
-    return float(min(1.0 / np.cos(np.abs(turns).max() / 2.0), MITRE_LIMIT))
-
-
-def _before(costmap: Costmap) -> Ints:
-    before = np.zeros((costmap.blocked.shape[0], costmap.width + 1), dtype=np.int64)
-    np.cumsum(costmap.blocked, axis=1, out=before[:, 1:])
-    return before
-
-
-def _field(costmap: Costmap, footprint: Footprint) -> DistanceField:
-    """Return the field of the ways for base_link: it keeps the inscribed radius.
-
-    It need not do so at a cell's centre: a cell counts as narrow if it may elsewhere.
-    """
-    cells, inscribed = costmap.blocked.size, footprint.inscribed_radius
-    corner = math.sqrt(0.5) * costmap.window.resolution  # from a cell's centre
-    places = (costmap.clearance + corner >= inscribed) & ~costmap.blocked
-    if not footprint.is_disc and inscribed == 0.0:  # base_link may be over what is blocked
-        places = np.ones_like(costmap.blocked)
-    return DistanceField(
-        moves=allowed_moves(places).ravel(),
-        narrow=(costmap.clearance < inscribed).ravel(),
-        distances=np.empty(cells, dtype=np.int32),
-        links=np.empty((cells + 1, 2), dtype=np.int32),
-        heads=np.empty(BUCKETS, dtype=np.int32),
-        state=np.zeros(2, dtype=np.int64),
-    )
-
-
-def _factors(costmap: Costmap) -> Floats:
-    """Return what a length costs by the cost of its cell, as a multiple of itself."""
-    if costmap.uniform:
-        return np.ones(1)
-    return 1.0 + costmap.top * np.minimum(np.arange(256), MAX_NON_OBSTACLE) / MAX_NON_OBSTACLE
-
-
-def _nodes(room: int) -> Nodes:
-    return Nodes(
-        poses=np.empty((room, 3)),
-        costs=np.empty(room),
-        guesses=np.empty(room),
-        keys=np.empty(room, dtype=np.int64),
-        parents=np.empty(room, dtype=np.int32),
-        motions=np.empty(room, dtype=np.int32),
-        closed=np.empty(room, dtype=np.bool_),
-        table=np.empty(4 * room, dtype=np.int32),
     )

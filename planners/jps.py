@@ -117,7 +117,7 @@ class JPSPlus(JPS):
     The first search makes the table: 16 bytes for each cell.
     """
 
-    name = "jps_plus"
+    name = "jps+"
 
     def look_up(self) -> Jumps:
         """Return the table of jumps."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import pythoncdt as cdt
 
 from groundmap.arrays import Bools, Bytes, Floats, Ints
@@ -135,7 +136,7 @@ class _Lines(NamedTuple):
     """What runs along the rows and columns of cell centres, each of shape (rows, cols)."""
 
     squares: Bools  #: shape (rows - 1, cols - 1), squares between four cells
-    kinds: Ints  #: of vertices; -1 where there is none
+    kinds: npt.NDArray[np.int8]  #: of vertices; -1 where there is none
     outline_east: Bools  #: from here to the next centre runs the border of squares
     outline_north: Bools
     spur_east: Bools  #: from here to the next centre runs a spur
@@ -155,8 +156,8 @@ def _lines(stand: Bools) -> _Lines:
     gates = spur_east | spur_north
     gates[:, 1:] |= spur_east[:, :-1]
     gates[1:] |= spur_north[:-1]
-    count = southwest.astype(np.int64) + southeast + northwest + northeast
-    kinds = np.full(stand.shape, -1)
+    count = southwest.astype(np.int8) + southeast + northwest + northeast
+    kinds = np.full(stand.shape, -1, dtype=np.int8)
     kinds[count == 1] = PLAIN
     kinds[count == 3] = CORNER
     kinds[(count == 2) & (southwest == northeast)] = PINCH

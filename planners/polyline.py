@@ -76,27 +76,16 @@ def merged(points: Floats) -> Floats:
     >>> merged(np.array([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0], [3.0, 0.0], [4.0, 1.0]])).tolist()
     [[0.0, 0.0], [3.0, 0.0], [4.0, 1.0]]
     """
-    kept = [points[0]]
-    for point in points[1:-1]:
-        _append(kept, point)
-    if len(kept) > 1 and _same(kept[-1], points[-1]):
-        kept.pop()
-    _append(kept, points[-1], even_if_same=True)
-    return np.array(kept)
-
-
-def _append(kept: list[Floats], point: Floats, *, even_if_same: bool = False) -> None:
-    if _same(kept[-1], point) and not even_if_same:
-        return
-    if len(kept) > 1:
-        (ax, ay), (bx, by) = kept[-1] - kept[-2], point - kept[-1]
-        if ax * by == ay * bx and ax * bx + ay * by > 0:
-            kept.pop()
-    kept.append(point)
-
-
-def _same(a: Floats, b: Floats) -> bool:
-    return bool(np.abs(a - b).max() < SAME)
+    differs = np.abs(np.diff(points, axis=0)).max(axis=1) >= SAME
+    # Inner points that repeat their predecessor go, and those that the last point repeats.
+    kept = np.concatenate([points[:1], points[1:-1][differs[:-1]]])
+    if len(kept) > 1 and not differs[-1]:
+        kept = kept[:-1]
+    line = np.concatenate([kept, points[-1:]])
+    steps = np.diff(line, axis=0)
+    (ax, ay), (bx, by) = steps[:-1].T, steps[1:].T
+    turns = (ax * by != ay * bx) | (ax * bx + ay * by <= 0)
+    return line[np.concatenate([[True], turns, [True]])]
 
 
 def crossed(points: Floats) -> Crossed:

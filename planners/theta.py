@@ -65,9 +65,9 @@ class Theta:
         if not costmap.uniform:
             raise ProblemError(
                 "planner",
-                "one that heeds what metres cost, such as 'astar'",
-                repr(self.name),
-                hint="It is for problems whose costs have no weight.",
+                f"uniform costs, which {self.name!r} needs",
+                "cells that cost more than others",
+                hint="Take 'astar', which heeds them.",
             )
         self.costmap = costmap
         self.costs = np.zeros(costmap.stand.size)

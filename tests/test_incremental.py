@@ -59,7 +59,7 @@ def outcome(ask: Callable[[], Route]) -> tuple[str, float]:
     st.booleans(),
     st.sampled_from([0.2, 0.6]),
 )
-@settings(max_examples=25)
+@settings(max_examples=25, deadline=None)
 def test_each_plan_is_as_good_as_one_from_scratch(
     seed: int, costs: CostSettings, clear_start: bool, radius: float
 ) -> None:
@@ -185,3 +185,15 @@ def test_a_3d_map_is_refused() -> None:
     problem = PlanningProblem(grid, start=(0, 0, 0), goal=(1, 1, 1), footprint=0.5)
     with pytest.raises(ProblemError, match="grid: expected a 2-D map, got one of 3-D"):
         IncrementalPlanner(problem)
+
+
+def test_what_was_cleared_around_the_start_is_unknown_again_once_the_robot_is_elsewhere() -> None:
+    z = free_field(SIDE, SIDE)
+    z[:, 7:9] = UNSEEN
+    planner = IncrementalPlanner(problem_on(z))
+    for start, joined in (((3, 3), False), ((8, 8), True), ((3, 3), False), ((8, 12), True)):
+        if joined:
+            assert planner.plan(start=start).start_unknown_area > 0
+        else:
+            with pytest.raises(EnclosedError, match="is fenced in"):
+                planner.plan(start=start)

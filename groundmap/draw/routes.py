@@ -53,24 +53,35 @@ def draw_route(
 
 
 def draw_routes(routes: Mapping[str, npt.ArrayLike], *, ax: Axes) -> list[Artist]:
-    """Draw several routes between the same places, each with its name in the legend.
+    """Draw several routes between the same places, with their names in the legend.
+
+    Routes that are the same to the last bit are one line, with all their names.
 
     Parameters
     ----------
     routes : mapping of str to array_like, shape (n, 2) [m, map]
     ax : matplotlib Axes
     """
-    artists: list[Artist] = []
-    for number, (name, waypoints) in enumerate(routes.items()):
+    lines: list[tuple[list[str], Floats]] = []
+    for name, waypoints in routes.items():
         points = as_floats("waypoints", waypoints, (None, 2))
-        line = ax.plot(*points.T, linewidth=1.6, zorder=5, label=name)[0]
+        same = next((names for names, line in lines if np.array_equal(line, points)), None)
+        if same is None:
+            lines.append(([name], points))
+        else:
+            same.append(name)
+    artists: list[Artist] = []
+    for number, (names, points) in enumerate(lines):
+        line = ax.plot(*points.T, zorder=5, label=", ".join(names))[0]
+        # The later, the thinner: what runs along another line still shows.
         line.set(
             color=COLOURS[number % len(COLOURS)],
             linestyle=DASHES[number // len(COLOURS) % len(DASHES)],
+            linewidth=1.4 + 0.8 * (len(lines) - 1 - number),
         )
         artists.append(line)
     add_to_legend(ax, artists)
-    return [*artists, _draw_ends(points, ax)] if artists else []
+    return [*artists, _draw_ends(lines[0][1], ax)] if artists else []
 
 
 def _draw_ends(points: Floats, ax: Axes) -> Artist:

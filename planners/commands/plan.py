@@ -18,7 +18,8 @@ from planners.errors import NoRouteError, PlanningError
 from planners.problem import PlanningProblem, Unknown
 from planners.registry import PLANNERS, plan
 from planners.route import Route, check_route_file
-from planners.shortcut import shortcut
+from planners.shortcuts import shortcut
+from planners.smoother import smooth
 
 ALL = "all"  # instead of a planner's name
 COLUMNS = ("length", "cost", "bound", "min_clearance", "mean_clearance", "min_confidence",
@@ -72,11 +73,10 @@ def plan_command(
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="A setting of the planner."),
     ] = None,
-    straighten: Annotated[
-        bool, typer.Option("--shortcut", help="Cut the route's corners as far as is safe.")
-    ] = False,
+    straighten: Annotated[bool, typer.Option("--shortcut", help="Pull the route tight.")] = False,
     turning_radius: Annotated[
-        float | None, typer.Option("--smooth", help="Round corners with at least this radius [m].")
+        float | None,
+        typer.Option("--smooth", help="Pull it tight and turn with at least this radius [m]."),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -106,7 +106,9 @@ def plan_command(
         _compare(problem, plot, time_limit, as_json=as_json, title=f"routes on {map_file}")
         return
     route = plan(problem, planner, time_limit=time_limit, **assignments(settings or []))
-    if straighten:
+    if turning_radius is not None:
+        route = smooth(problem, route, turning_radius=turning_radius)
+    elif straighten:
         route = shortcut(problem, route)
     if out is not None:
         route.save(out)

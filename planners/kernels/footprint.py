@@ -3,10 +3,6 @@
 Positions are in cells: x grows with the column, and cell [row, col] is the closed square from
 (col, row) to (col + 1, row + 1). Touching a square is no overlap. What lies beyond the array is
 not looked at.
-
-A convex shape meets exactly those cells of a row whose columns overlap the extent in x of its part
-within the row. So the shape's outline is walked once, row by row, and a running count of blocked
-cells answers for all columns between the two ends at once.
 """
 
 from __future__ import annotations
@@ -20,6 +16,7 @@ from numba import njit
 from groundmap.arrays import Bools, Floats, Ints
 from planners.kernels.clearance import segment_clearance
 from planners.kernels.curves import along
+from planners.kernels.hull import clipped, hull_clear, hull_of
 
 TOUCH = 5e-10  # [cells] overlap that is put down to rounding
 
@@ -78,7 +75,7 @@ def pose_clear(
         for i in range(n):
             ax, ay = placed[i]
             bx, by = placed[i + 1]
-            left, right = _clipped(ax, ay, bx, by, row + TOUCH, row + 1.0 - TOUCH)
+            left, right = clipped(ax, ay, bx, by, row + TOUCH, row + 1.0 - TOUCH)
             if left <= right:
                 first, last = math.floor(left + TOUCH), math.ceil(right - TOUCH) - 1
                 for col in range(max(first, 0), min(last, cols - 1) + 1):
@@ -121,7 +118,7 @@ def motion_clear(
     curvature: float,
     length: float,
 ) -> bool:
-    """Whether the footprint overlaps no blocked square all along a motion.
+    """Whether the footprint overlaps no blocked square all along a motion that keeps to the map.
 
     The motion is cut into steps. Of each, the convex hull of every convex part in its two poses is
     looked at, grown by what the turn in between may add: no more than that is ever covered.
@@ -146,8 +143,9 @@ def motion_clear(
         grow = farthest * (1.0 - math.cos(0.5 * turn / steps))
     reach = 0.5 * (abs(length) + turn * shape.arm)  # of any point, from the pose half-way
     excess = 0.5 * turn / steps * shape.arm + grow  # of the hulls over all the poses in between
-    if _covered(
-        ground.clearance, shape.discs, *along(x, y, yaw, curvature, 0.5 * length), reach + excess
+    mid_x, mid_y, mid = along(x, y, yaw, curvature, 0.5 * length)
+    if _within(ground.clearance, mid_x, mid_y, 0.5 * abs(length)) and _covered(
+        ground.clearance, shape.discs, mid_x, mid_y, mid, reach + excess
     ):
         return True
     if curvature == 0.0:
@@ -156,6 +154,8 @@ def motion_clear(
     ax, ay, a = x, y, yaw
     for i in range(1, steps + 1):
         bx, by, b = along(x, y, yaw, curvature, length * i / steps)
+        if not _within(ground.clearance, bx, by, 0.0):
+            return False
         if _nearness(ground.clearance, bx, by)[1] < shape.inscribed - TOUCH:
             return False
         between = along(x, y, yaw, curvature, length * (i - 0.5) / steps)
@@ -196,9 +196,16 @@ def step_clear(
             points[k, 0], points[k, 1] = ax + cos_a * u - sin_a * v, ay + sin_a * u + cos_a * v
             points[k + 1, 0] = bx + cos_b * u - sin_b * v
             points[k + 1, 1] = by + sin_b * u + cos_b * v
-        if not _hull_clear(ground.before, _hull(points), grow - TOUCH):
+        if not hull_clear(ground.before, hull_of(points), grow - TOUCH):
             return False
     return True
+
+
+@njit(cache=True, nogil=True)
+def _within(clearance: Floats, x: float, y: float, margin: float) -> bool:
+    """Whether a point lies on the map, and no nearer to its border than `margin`."""
+    rows, cols = clearance.shape
+    return bool(margin <= x < cols - margin and margin <= y < rows - margin)
 
 
 @njit(cache=True, nogil=True)
@@ -224,70 +231,3 @@ def _covered(
         if _nearness(clearance, at_x, at_y)[0] < radius + slack:
             return False
     return True
-
-
-@njit(cache=True, nogil=True)
-def _hull(points: Floats) -> Floats:
-    """Return the convex hull of a few points, closed (Andrew 1979). Sorts them in place."""
-    n = len(points)
-    for i in range(1, n):
-        x, y = points[i]
-        k = i
-        while k > 0 and (points[k - 1, 0] > x or (points[k - 1, 0] == x and points[k - 1, 1] > y)):
-            points[k, 0], points[k, 1] = points[k - 1, 0], points[k - 1, 1]
-            k -= 1
-        points[k, 0], points[k, 1] = x, y
-    hull = np.empty((2 * n + 1, 2))
-    size = turned = 0
-    for i in range(2 * n - 1):
-        at = i if i < n else 2 * n - 2 - i  # there along the lower side, and back along the upper
-        kept = 2 if i < n else turned + 1
-        while size >= kept and not _turns_left(hull, size, points[at, 0], points[at, 1]):
-            size -= 1
-        hull[size, 0], hull[size, 1] = points[at, 0], points[at, 1]
-        size += 1
-        if i == n - 1:
-            turned = size
-    return hull[:size]
-
-
-@njit(cache=True, nogil=True)
-def _turns_left(hull: Floats, size: int, x: float, y: float) -> bool:
-    ax, ay = hull[size - 2]
-    bx, by = hull[size - 1]
-    return bool((bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0.0)
-
-
-@njit(cache=True, nogil=True)
-def _hull_clear(before: Ints, hull: Floats, grow: float) -> bool:
-    """Whether a closed convex outline, grown by `grow` in x and y, overlaps no blocked square."""
-    rows, cols = before.shape[0], before.shape[1] - 1
-    low = max(math.floor(hull[:, 1].min() - grow), 0)
-    high = min(math.floor(hull[:, 1].max() + grow), rows - 1)
-    for row in range(low, high + 1):
-        left, right = math.inf, -math.inf
-        for i in range(len(hull) - 1):
-            ax, ay, bx, by = hull[i, 0], hull[i, 1], hull[i + 1, 0], hull[i + 1, 1]
-            lower, upper = _clipped(ax, ay, bx, by, row - grow, row + 1.0 + grow)
-            left, right = min(left, lower), max(right, upper)
-        if left <= right:
-            first, last = math.floor(left - grow), math.ceil(right + grow) - 1
-            first, last = max(first, 0), min(last, cols - 1)
-            if first <= last and before[row, last + 1] > before[row, first]:
-                return False
-    return True
-
-
-@njit(cache=True, nogil=True)
-def _clipped(
-    ax: float, ay: float, bx: float, by: float, low: float, high: float
-) -> tuple[float, float]:
-    """Return the extent in x of the part of a segment between two heights; (inf, -inf) if none."""
-    if max(ay, by) < low or min(ay, by) > high:
-        return math.inf, -math.inf
-    if ay == by:
-        return min(ax, bx), max(ax, bx)
-    s, t = (low - ay) / (by - ay), (high - ay) / (by - ay)
-    s, t = min(max(s, 0.0), 1.0), min(max(t, 0.0), 1.0)
-    u, v = ax + s * (bx - ax), ax + t * (bx - ax)
-    return min(u, v), max(u, v)

@@ -14,41 +14,29 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from groundmap.arrays import Bools, Bytes, Floats, Ints, Ints32
+from groundmap.arrays import Bools, Floats, Ints, Ints32
 from planners.kernels.astar import FAR, ONE
-from planners.kernels.curves import SEGMENTS, along, dubins_word, reeds_shepp_word, wrap
+from planners.kernels.curves import SEGMENTS, along, wrap
 from planners.kernels.footprint import Ground, Shape, cuts, motion_clear
 from planners.kernels.heap import drop_top, push, top_node
 from planners.kernels.hybrid_field import SIDE, UNREACHED, Field, distance_of
+from planners.kernels.hybrid_motion import (
+    ROOT,
+    TURNS,
+    Drive,
+    Prices,
+    change_of,
+    curve_of,
+    guess_of,
+    pieces,
+    price_of,
+    steering,
+)
 
 SLICE_DONE, FOUND, EXHAUSTED, FULL = range(4)  # what `advance` returns
 SIZE, COUNT, EXPANDED, WAIT, BEST, LAST = range(6)  # entries of `state`
 STATE_SIZE = 6
-TURNS = 3  # motions of one gear: to the right, straight, to the left; then those backwards
-ROOT = -1
-DETOUR = 7.3  # [radii] no curve, even forward only, needs more beyond the straight distance
 HASH = 0x9E3779B97F4A7C15 - 2**64  # odd; the golden ratio spreads keys that are close together
-
-
-class Drive(NamedTuple):
-    """How the robot moves, and what that costs."""
-
-    step: float  #: length of a motion
-    curvature: float  #: at the steering's stop
-    gears: int  #: 1: forward only; 2: both ways
-    reverse: float  #: what a cell's side driven backwards costs
-    cusp: float  #: what a change of gear costs
-    steer: float  #: what turning the steering from stop to stop costs
-    bins: int  #: of headings
-    ratio: float  #: a curve is tried after as many nodes as steps remain, divided by this
-    weight: float  #: how much more than itself the guess of what is left counts
-
-
-class Prices(NamedTuple):
-    """What a length costs where, as a multiple of itself."""
-
-    costs: Bytes  #: shape (rows, cols)
-    factors: Floats  #: shape (256,) by cost; shape (1,) if every cell's is 1
 
 
 class Nodes(NamedTuple):
@@ -96,7 +84,7 @@ def begin(
     if far == UNREACHED:
         return state
     key = _key(ground.blocked.shape[1], drive.bins, start[0], start[1], start[2])
-    guess = _guess(drive, goal, start[0], start[1], start[2], far / SIDE)
+    guess = guess_of(drive, goal, start[0], start[1], start[2], far / SIDE)
     nodes.table[_slot(nodes.table, nodes.keys, key)] = 0
     nodes.poses[0] = start
     nodes.costs[0], nodes.guesses[0], nodes.keys[0] = 0.0, guess, key
@@ -161,18 +149,6 @@ def refile(nodes: Nodes, count: int) -> None:
 
 
 @njit(cache=True, nogil=True)
-def steering(motion: int) -> tuple[int, int]:
-    """Return the gear of a motion, 1 or -1, and its turn: 1 to the left, 0 or -1."""
-    return 1 if motion < TURNS else -1, motion % TURNS - 1
-
-
-@njit(cache=True, nogil=True)
-def pieces(drive: Drive, length: float) -> int:
-    """Return into how many motions a segment of a curve is cut."""
-    return max(1, math.ceil(abs(length) / drive.step))
-
-
-@njit(cache=True, nogil=True)
 def driven(shape: Shape, start: Floats, curvatures: Floats, lengths: Floats) -> Floats:
     """Return the poses along motions, as `motion_clear` cuts them, shape (n, 3)."""
     total = 1
@@ -214,8 +190,8 @@ def _try(
     rows, cols = ground.blocked.shape
     if not (0.0 <= x < cols and 0.0 <= y < rows):
         return
-    cost = nodes.costs[node] + _change(drive, nodes.motions[node], gear, turn)
-    cost += _price(
+    cost = nodes.costs[node] + change_of(drive, nodes.motions[node], gear, turn)
+    cost += price_of(
         prices.costs, prices.factors, drive.reverse, from_x, from_y, from_yaw, curvature, length
     )
     key = _key(cols, drive.bins, x, y, yaw)
@@ -232,7 +208,7 @@ def _try(
         other = state[COUNT]
         state[COUNT] += 1
         nodes.table[slot] = other
-    guess = _guess(drive, goal, x, y, yaw, far / SIDE)
+    guess = guess_of(drive, goal, x, y, yaw, far / SIDE)
     nodes.poses[other, 0], nodes.poses[other, 1], nodes.poses[other, 2] = x, y, wrap(yaw)
     nodes.costs[other], nodes.guesses[other], nodes.keys[other] = cost, guess, key
     nodes.parents[other], nodes.motions[other], nodes.closed[other] = node, motion, False
@@ -255,7 +231,7 @@ def _shoot(
     """Try the curve from a node to the goal; keep it if it is clear and makes the best route."""
     lengths, turns = np.zeros(SEGMENTS), np.zeros(SEGMENTS, dtype=np.int64)
     x, y, yaw = nodes.poses[node]
-    rest = _curve(drive, goal, x, y, yaw, lengths, turns)
+    rest = curve_of(drive, goal, x, y, yaw, lengths, turns)
     if (nodes.costs[node] + rest) * ONE >= state[BEST]:
         return
     total, before = nodes.costs[node], nodes.motions[node]
@@ -264,77 +240,19 @@ def _shoot(
             continue
         curvature, length = turns[i] * drive.curvature, lengths[i] / drive.curvature
         gear = 1 if length > 0.0 else -1
-        total += _change(drive, before, gear, turns[i])
+        total += change_of(drive, before, gear, turns[i])
         before = turns[i] + 1 + (0 if gear > 0 else TURNS)
         count = pieces(drive, length)
         for _ in range(count):
             if not motion_clear(ground, shape, x, y, yaw, curvature, length / count):
                 return
-            total += _price(
+            total += price_of(
                 prices.costs, prices.factors, drive.reverse, x, y, yaw, curvature, length / count
             )
             x, y, yaw = along(x, y, yaw, curvature, length / count)
     if total * ONE < state[BEST]:
         state[BEST], state[LAST] = round(total * ONE), node
         shot.lengths[:], shot.turns[:] = lengths, turns
-
-
-@njit(cache=True, nogil=True)
-def _curve(
-    drive: Drive, goal: Floats, x: float, y: float, yaw: float, lengths: Floats, turns: Ints
-) -> float:
-    """Find the cheapest curve to the goal, heedless of obstacles; return its cost."""
-    dx, dy = (goal[0] - x) * drive.curvature, (goal[1] - y) * drive.curvature
-    cosine, sine = math.cos(yaw), math.sin(yaw)
-    u, v, turn = cosine * dx + sine * dy, cosine * dy - sine * dx, wrap(goal[2] - yaw)
-    if drive.gears == 1:
-        return dubins_word(u, v, turn, lengths, turns) / drive.curvature
-    cusp = drive.cusp * drive.curvature
-    return reeds_shepp_word(u, v, turn, drive.reverse, cusp, lengths, turns) / drive.curvature
-
-
-@njit(cache=True, nogil=True)
-def _guess(drive: Drive, goal: Floats, x: float, y: float, yaw: float, far: float) -> float:
-    """Return the larger of the way around obstacles and the way that the steering allows."""
-    if far >= math.hypot(goal[0] - x, goal[1] - y) + DETOUR / drive.curvature:
-        return far
-    lengths, turns = np.empty(SEGMENTS), np.empty(SEGMENTS, dtype=np.int64)
-    return max(far, _curve(drive, goal, x, y, yaw, lengths, turns))
-
-
-@njit(cache=True, nogil=True)
-def _change(drive: Drive, motion: int, gear: int, turn: int) -> float:
-    """Return what it costs to go on after a motion in another gear or with another steering."""
-    if motion == ROOT:
-        return 0.0
-    gear_before, turn_before = steering(motion)
-    cost = 0.5 * drive.steer * abs(turn - turn_before)
-    return cost + drive.cusp if gear != gear_before else cost
-
-
-@njit(cache=True, nogil=True)
-def _price(
-    costs: Bytes,
-    factors: Floats,
-    reverse: float,
-    x: float,
-    y: float,
-    yaw: float,
-    curvature: float,
-    length: float,
-) -> float:
-    """Return what a motion costs: the cells half-way and at its end count for half of it each."""
-    cost = length if length > 0.0 else -reverse * length
-    if len(factors) == 1:
-        return cost
-    rows, cols = costs.shape
-    total = 0.0
-    for part in (0.5, 1.0):
-        to_x, to_y, _ = along(x, y, yaw, curvature, part * length)
-        row = min(max(math.floor(to_y), 0), rows - 1)
-        col = min(max(math.floor(to_x), 0), cols - 1)
-        total += 0.5 * factors[costs[row, col]]
-    return cost * total
 
 
 @njit(cache=True, nogil=True)

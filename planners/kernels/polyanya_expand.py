@@ -99,38 +99,36 @@ def from_interval(
     turns_right = _may_turn(mesh, root, right, cone[2], cone[3])
     side = mesh.twins[out]
     polygon = mesh.owner[side]
-    c, (c_left, c_right) = right, _beside(mesh, root, cone, right)
+    a, (a_left, a_right) = right, _beside(mesh, root, cone, right)
     for _ in range(mesh.first[polygon + 1] - mesh.first[polygon] - 1):
         side = following(mesh, side)
-        d = mesh.corners[following(mesh, side)]
-        d_left, d_right = _beside(mesh, root, cone, d)
-        if mesh.kinds[d] >= GATE and d != left:
-            if d_left <= 0.0 and d_right >= 0.0:
-                reach(mesh, query, pool, state, d, root)
-            elif d_left > 0.0 and turns_left and arrive(mesh, query, left, root):
-                reach(mesh, query, pool, state, d, left)
-            elif d_right < 0.0 and turns_right and arrive(mesh, query, right, root):
-                reach(mesh, query, pool, state, d, right)
+        b = mesh.corners[following(mesh, side)]
+        b_left, b_right = _beside(mesh, root, cone, b)
+        if mesh.kinds[b] >= GATE and b != left:
+            if b_left <= 0.0 and b_right >= 0.0:
+                reach(mesh, query, pool, state, b, root)
+            elif b_left > 0.0 and turns_left and arrive(mesh, query, left, root):
+                reach(mesh, query, pool, state, b, left)
+            elif b_right < 0.0 and turns_right and arrive(mesh, query, right, root):
+                reach(mesh, query, pool, state, b, right)
         if useful(mesh, query, side):
-            (cx, cy), (dx, dy) = at(mesh, c), at(mesh, d)
-            if d_right > 0.0 and c_left < 0.0:
-                lx, ly = (dx - x, dy - y) if d_left <= 0.0 else (cone[0], cone[1])
-                rx, ry = (cx - x, cy - y) if c_right >= 0.0 else (cone[2], cone[3])
+            (ax, ay), (bx, by) = at(mesh, a), at(mesh, b)
+            if a_left < 0.0 and b_right > 0.0:
+                lx, ly = (bx - x, by - y) if b_left <= 0.0 else (cone[0], cone[1])
+                rx, ry = (ax - x, ay - y) if a_right >= 0.0 else (cone[2], cone[3])
                 add(query, pool, state, root, side, lx, ly, rx, ry)
-            if (c_left >= 0.0 or d_left > 0.0) and turns_left and arrive(mesh, query, left, root):
-                # The new right ray goes on where the old left one met the corner.
-                rx, ry = (left_x - x, left_y - y) if c_left < 0.0 else (cx - left_x, cy - left_y)
-                add(query, pool, state, left, side, dx - left_x, dy - left_y, rx, ry)
-            if (
-                (d_right <= 0.0 or c_right < 0.0)
-                and turns_right
-                and arrive(mesh, query, right, root)
-            ):
-                lx, ly = (
-                    (right_x - x, right_y - y) if d_right > 0.0 else (dx - right_x, dy - right_y)
-                )
-                add(query, pool, state, right, side, lx, ly, cx - right_x, cy - right_y)
-        c, c_left, c_right = d, d_left, d_right
+            # Where a side is cut, rays of the new cones go on where the old ones met the corner.
+            hidden_left = turns_left and (a_left >= 0.0 or b_left > 0.0)
+            if hidden_left and arrive(mesh, query, left, root):
+                to_bx, to_by, to_ax, to_ay = bx - left_x, by - left_y, ax - left_x, ay - left_y
+                rx, ry = (left_x - x, left_y - y) if a_left < 0.0 else (to_ax, to_ay)
+                add(query, pool, state, left, side, to_bx, to_by, rx, ry)
+            hidden_right = turns_right and (a_right < 0.0 or b_right <= 0.0)
+            if hidden_right and arrive(mesh, query, right, root):
+                to_bx, to_by, to_ax, to_ay = bx - right_x, by - right_y, ax - right_x, ay - right_y
+                lx, ly = (right_x - x, right_y - y) if b_right > 0.0 else (to_bx, to_by)
+                add(query, pool, state, right, side, lx, ly, to_ax, to_ay)
+        a, a_left, a_right = b, b_left, b_right
     if query.looked_for[polygon]:
         left, right = left if turns_left else -1, right if turns_right else -1
         _find(mesh, query, state, root, cone, polygon, left, right)

@@ -14,7 +14,7 @@ from numba import njit
 from groundmap.arrays import Bools, Floats, Ints, Ints32
 from planners.kernels.clearance import segment_clearance
 
-WORTH = 0.5  # [cells] a step that the distances vouch for, if longer than this, saves an exact look
+WORTH = 0.25  # [cells] a step that distances vouch for, if this long, saves an exact look
 
 
 @njit(cache=True, nogil=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,8 +19,8 @@ from planners import CostSettings, NoRouteError, PlanningProblem, ProblemError, 
 from planners.audit import audit
 from planners.errors import SmoothingError
 from planners.kernels.smooth import STIFF, TENSION, free_discs, nearest, relax
-from planners.shortcut import shortcut
-from planners.smooth import max_curvature, smooth
+from planners.shortcuts import shortcut
+from planners.smoother import max_curvature, smooth
 
 rngs = st.integers(0, 2**32 - 1).map(np.random.default_rng)
 
@@ -45,7 +46,8 @@ def corridor(*, width: int, turn: int) -> Floats32:
 def along(line: Floats) -> Floats:
     """Return the direction of each piece of a line [rad]."""
     dx, dy = np.diff(line, axis=0).T
-    return np.arctan2(dy, dx)
+    directions: Floats = np.arctan2(dy, dx)
+    return directions
 
 
 @given(rngs, st.sampled_from([0.0, 0.2, 0.45]), st.sampled_from([0.3, 1.0, 2.0]))
@@ -108,8 +110,8 @@ def test_a_straight_route_stays_as_it_is() -> None:
 @given(st.floats(-math.pi, math.pi), st.floats(-math.pi, math.pi))
 @settings(max_examples=20)
 def test_yaws_that_are_asked_for_are_kept(start_yaw: float, goal_yaw: float) -> None:
-    ends = {"start": (20.0, 32.0, start_yaw), "goal": (44.0, 32.0, goal_yaw)}
-    problem = PlanningProblem(grid_of(free_field(64, 64)), **ends, footprint=1.0)
+    start, goal = (20.0, 32.0, start_yaw), (44.0, 32.0, goal_yaw)
+    problem = PlanningProblem(grid_of(free_field(64, 64)), start=start, goal=goal, footprint=1.0)
     try:
         rounded = smooth(problem, plan(problem), turning_radius=3.0)
     except SmoothingError:
@@ -122,7 +124,7 @@ def test_yaws_that_are_asked_for_are_kept(start_yaw: float, goal_yaw: float) -> 
     assert np.abs(np.angle(np.exp(1j * directions))).max() < 1e-6
 
 
-def cornered(**changes: object) -> PlanningProblem:
+def cornered(**changes: Any) -> PlanningProblem:
     """Return the problem to get around a corner with 0.5 m to spare on either side."""
     grid = grid_of(corridor(width=5, turn=40))
     problem = PlanningProblem(grid, start=(3.5, 3.5), goal=(38.5, 58.5), footprint=2.0)
@@ -189,6 +191,22 @@ def test_a_dearer_route_has_a_wider_bound() -> None:
     assert rounded.bound == pytest.approx(rounded.cost / route.cost)
     none = smooth(problem, replace(route, bound=None), turning_radius=8.0)
     assert none.bound is None
+
+
+@pytest.mark.parametrize("turning_radius", [2.0, 6.0, 20.0])
+def test_where_unknown_is_allowed_it_stays_on_the_map(turning_radius: float) -> None:
+    z = free_field(64, 64)
+    z[:63, 30] = BLOCKED
+    problem = PlanningProblem(
+        grid_of(z), start=(20.5, 50.5), goal=(40.5, 50.5), footprint=0.4, unknown="allow"
+    )
+    try:
+        rounded = smooth(problem, plan(problem), turning_radius=turning_radius)
+    except SmoothingError:
+        rounded = None
+    assert (rounded is None) == (turning_radius == 20.0)
+    if rounded is not None:
+        assert rounded.waypoints.max() <= 66.0
 
 
 # Curvature

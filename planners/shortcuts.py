@@ -20,7 +20,7 @@ from planners.route import Route
 
 AHEAD, AHEAD_DENSE = 128, 16  # points that a leg may skip: bounds the time on routes of many turns
 PASSES = 12
-GAIN = 1e-4  # share of the cost; a pass that wins less is the last
+GAIN = 2e-4  # share of the cost; a pass that wins less is the last
 PRICE = 1e-2  # [cells] a leg more must win at least as much
 TIE = 1e-9  # [cells] the same where cells cost extra, so that no line gets dearer
 SAME_PLACE = 1e-9  # [m]

@@ -17,7 +17,7 @@ from planners.errors import Point, ProblemError, SmoothingError
 from planners.kernels.smooth import free_discs, relax
 from planners.problem import PlanningProblem
 from planners.route import Route
-from planners.shortcut import checked, cost_of, tightened
+from planners.shortcuts import checked, cost_of, tightened
 
 ROUNDS, INNER = 24, 100  # of discs found anew, and of the relaxation in between
 FEWEST, MOST = 8, 1_000_000  # pieces of a line
@@ -189,12 +189,13 @@ def _bent(costmap: Costmap, line: Floats, goals: _Goals) -> tuple[Floats, bool]:
         cells = costmap.to_cells(line)
         reach = REACH[k % len(REACH)] * radius
         discs = free_discs(costmap.blocked, cells, (costmap.radius + margin) / size, reach / size)
+        discs = _on_map(costmap, discs)
         bend = step * step / (radius * strictness * size)
         cells = relax(cells, discs, bend, low, len(line) - high, INNER)
         inner = cells[low:-high] * size + costmap.window.origin
         line = np.concatenate([line[:low], inner, line[-high:]])
         curvature, clearance = max_curvature(line), costmap.clearance_of(line)
-        if curvature <= 1.0 / radius and clearance >= need:
+        if curvature <= 1.0 / radius and clearance >= need and _is_on_map(costmap, line):
             return line, True
         if curvature > 1.0 / radius:
             tighter = strictness * min(TIGHTER, math.sqrt(curvature * radius))
@@ -202,6 +203,19 @@ def _bent(costmap: Costmap, line: Floats, goals: _Goals) -> tuple[Floats, bool]:
         if clearance < need:
             margin += min(need - clearance, WIDER * size)
     return line, False
+
+
+def _on_map(costmap: Costmap, discs: Floats) -> Floats:
+    """Return discs cut to the costmap, beyond which nothing is blocked where unknown is allowed."""
+    most = np.array(costmap.blocked.shape[::-1], dtype=np.float64)
+    centres = np.clip(discs[:, :2], 0.0, most)
+    border = np.minimum(centres, most - centres).min(axis=1)
+    return np.column_stack([centres, np.minimum(discs[:, 2], border)])
+
+
+def _is_on_map(costmap: Costmap, line: Floats) -> bool:
+    cells = costmap.to_cells(line)
+    return bool((cells >= 0.0).all() and (cells < costmap.blocked.shape[::-1]).all())
 
 
 def _spaced(line: Floats, goals: _Goals) -> tuple[Floats, float]:
@@ -235,7 +249,7 @@ def _curvatures(steps: Floats) -> Floats:
 def _headings(line: Floats, yaws: tuple[float | None, float | None]) -> Floats:
     """Return the directions of a line at its points, shape (n,) [rad]."""
     across = np.concatenate([line[1:2] - line[:1], line[2:] - line[:-2], line[-1:] - line[-2:-1]])
-    headings = np.arctan2(across[:, 1], across[:, 0])
+    headings: Floats = np.arctan2(across[:, 1], across[:, 0])
     for end, yaw in zip((0, -1), yaws, strict=True):
         if yaw is not None:
             headings[end] = yaw

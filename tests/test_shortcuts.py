@@ -21,7 +21,7 @@ from planners.costmap import Costmap
 from planners.kernels.distance import NOWHERE, squared_distances
 from planners.kernels.shortcut import best_chain, keeps, leg_cost
 from planners.polyline import crossed, length_of
-from planners.shortcut import cost_of, shortcut, tightened
+from planners.shortcuts import cost_of, shortcut, tightened
 
 RADII = [0.0, 0.4, 0.5, math.sqrt(0.5), 1.0]
 UNIFORM = np.empty((0, 0))
@@ -56,7 +56,9 @@ def test_it_is_never_longer_and_keeps_ends_and_radius(
     rng: np.random.Generator, radius: float
 ) -> None:
     start, goal = rng.uniform(0.1, 23.9, (2, 2))
-    problem, route = planned(cluttered(rng, side=24, boxes=rng.integers(12)), start, goal, radius)
+    problem, route = planned(
+        cluttered(rng, side=24, boxes=int(rng.integers(12))), start, goal, radius
+    )
     if route is None:
         return
     tight = shortcut(problem, route)
@@ -155,17 +157,20 @@ def added_up(costmap: Costmap, line: Floats) -> float:
 
 def test_a_detour_around_dear_ground_is_not_cut_short() -> None:
     z = free_field(64, 64)
-    z[:, :] = -1.0
     z[10:30, 20:40] = -0.02
-    grid, ends = grid_of(z), {"start": (5.5, 20.5), "goal": (58.5, 20.5)}
-    costs = CostSettings(confidence_weight=20.0)
-    problem = PlanningProblem(grid, **ends, footprint=0.5, costs=costs)
-    tight = shortcut(problem, plan(problem))
+    problem = PlanningProblem(
+        grid_of(z),
+        start=(5.5, 20.5),
+        goal=(58.5, 20.5),
+        footprint=0.5,
+        costs=CostSettings(confidence_weight=20.0),
+    )
+    route = plan(problem)
+    tight = shortcut(problem, route)
     dear = shapely.box(20, 10, 40, 30)
     assert shapely.LineString(tight.waypoints).intersection(dear).length < 1.0
-    assert tight.length < plan(problem).length
-    short = shortcut(PlanningProblem(grid, **ends, footprint=0.5), plan(problem))
-    assert short.length < 53.01
+    assert tight.length < route.length
+    assert shortcut(replace(problem, costs=CostSettings()), route).length < 53.01
 
 
 # The kernels
@@ -180,8 +185,8 @@ def test_a_segment_keeps_a_distance_if_shapely_says_so(
     distance = shapely.distance(shapely.LineString([a, b]), union_of_squares(blocked))
     assume(abs(distance - need) > 1e-9)
     squared = squared_distances(blocked, NOWHERE)
-    assert keeps(blocked, squared, *a, *b, need) == (distance > need)
-    assert keeps(blocked, squared, *a, *a, need) == (
+    assert keeps(blocked, squared, a[0], a[1], b[0], b[1], need) == (distance > need)
+    assert keeps(blocked, squared, a[0], a[1], a[0], a[1], need) == (
         shapely.distance(shapely.Point(a), union_of_squares(blocked)) >= need
     )
 
