@@ -1,7 +1,11 @@
 """From A to B on a confidence grid: routes, or reasons why there is none."""
 
+from planners.ara import ARASettings
 from planners.astar import AStarSettings, DijkstraSettings, WeightedAStarSettings
+from planners.auto import AutoSettings
 from planners.costs import CostSettings
+from planners.dstar_lite import DStarLiteSettings
+from planners.enclosure import widest_route
 from planners.errors import (
     AuditError,
     EnclosedError,
@@ -10,31 +14,61 @@ from planners.errors import (
     OutsideMapError,
     PlanningError,
     ProblemError,
+    SmoothingError,
     TimeLimitError,
     UnknownSpaceError,
 )
+from planners.fields import distance_field, reachable
 from planners.footprint import Footprint
+from planners.hybrid import HybridAStarSettings
+from planners.incremental import IncrementalPlanner
+from planners.jps import JPSPlusSettings, JPSSettings
+from planners.many import plan_many
+from planners.polyanya import PolyanyaSettings
 from planners.problem import PlanningProblem
 from planners.registry import PLANNERS, plan
 from planners.route import Route
+from planners.shortcuts import shortcut
+from planners.smoother import max_curvature, smooth
+from planners.theta import LazyThetaSettings, ThetaSettings
+from planners.widest import WidestRoute
 
 __all__ = [
+    "ARASettings",
     "AStarSettings",
     "AuditError",
+    "AutoSettings",
     "CostSettings",
+    "DStarLiteSettings",
     "DijkstraSettings",
     "EnclosedError",
     "Footprint",
+    "HybridAStarSettings",
+    "IncrementalPlanner",
+    "JPSPlusSettings",
+    "JPSSettings",
+    "LazyThetaSettings",
     "NoRouteError",
     "NonFreeError",
     "OutsideMapError",
     "PLANNERS",
     "PlanningError",
     "PlanningProblem",
+    "PolyanyaSettings",
     "ProblemError",
     "Route",
+    "SmoothingError",
+    "ThetaSettings",
     "TimeLimitError",
     "UnknownSpaceError",
     "WeightedAStarSettings",
+    "WidestRoute",
+    "distance_field",
+    "max_curvature",
     "plan",
+    "plan_many",
+    "reachable",
+    "shortcut",
+    "smooth",
+    "widest_route",
 ]

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
-from groundmap.arrays import Floats
+from groundmap.arrays import Bools, Floats
 from planners.audit import audit
 from planners.audit3d import audit3d
 from planners.costmap import SLACK, Costmap
-from planners.engine import Found
+from planners.engine import Found, Pose
 from planners.errors import (
     NonFreeError,
     OutsideMapError,
@@ -19,28 +20,15 @@ from planners.errors import (
     ProblemError,
     UnknownSpaceError,
 )
+from planners.kernels.footprint import pose_clear
 from planners.problem import PlanningProblem
 from planners.route import Route
 from planners.space import Space
 from planners.voxels import Voxels
 
 
-def space_of(problem: PlanningProblem) -> Costmap | Voxels:
-    """Return the map as a problem sees it, if start and goal are places for the footprint.
-
-    Raises
-    ------
-    OutsideMapError, NonFreeError, UnknownSpaceError
-    """
-    check_on_map(problem)
-    space = _seen(problem)
-    check_space(space, "start", problem.start_xy)
-    check_space(space, "goal", problem.goal_xy)
-    return space
-
-
 def costmap_of(problem: PlanningProblem) -> Costmap:
-    """Return the costmap of a problem on a 2-D map, as `space_of` does.
+    """Return the costmap of a problem on a 2-D map whose start and goal are places for its disc.
 
     Raises
     ------
@@ -50,12 +38,16 @@ def costmap_of(problem: PlanningProblem) -> Costmap:
     """
     if problem.grid.ndim != 2:
         raise ProblemError("grid", "a 2-D map", f"one of {problem.grid.ndim}-D")
-    space = space_of(problem)
-    assert isinstance(space, Costmap)
-    return space
+    check_on_map(problem)
+    costmap = Costmap.of(problem)
+    check_space(costmap, "start", problem.start_xy)
+    check_space(costmap, "goal", problem.goal_xy)
+    return costmap
 
 
-def answer(space: Costmap | Voxels, found: Found, *, planner: str, seconds: float) -> Route:
+def answer(
+    space: Costmap | Voxels, found: Found, *, planner: str, seconds: float, audited: bool = True
+) -> Route:
     """Return what a planner found as a route that the audit passed.
 
     Raises
@@ -63,11 +55,12 @@ def answer(space: Costmap | Voxels, found: Found, *, planner: str, seconds: floa
     AuditError
         It keeps not what was asked: a bug in the planner.
     """
-    if space.problem.grid.ndim == 3:
+    if audited and space.problem.grid.ndim == 3:
         audit3d(space.problem, found.waypoints)
-    else:
+    elif audited:
         audit(space.problem, found.waypoints, headings=found.headings)
-    return Route.along(space, found, planner=planner, seconds=seconds)
+    route = Route.along(space, found, planner=planner, seconds=seconds)
+    return route if audited else replace(route, audit="skipped")
 
 
 def check_on_map(problem: PlanningProblem) -> None:
@@ -90,40 +83,79 @@ def check_on_map(problem: PlanningProblem) -> None:
         if not _touches_tile(problem, xy, margin):
             if not any(True for _ in grid.tiles()):
                 raise OutsideMapError(place, xy, bounds=())
-            nearest = nearest_place(_seen(replace(problem, clear_start=False)), xy)
+            nearest = nearest_place(space_of(replace(problem, clear_start=False)), xy)
             raise OutsideMapError(place, xy, bounds=tuple(grid.bounds().tolist()), nearest=nearest)
 
 
-def check_space(space: Space, place: Place, xy: Point) -> None:
+def check_space(space: Space, place: Place, pose: Pose, *, headings: bool = False) -> None:
     """Check that the footprint fits: the state of the place itself comes before what is near.
+
+    Parameters
+    ----------
+    space : Costmap or Voxels
+    place : {"start", "goal"}
+        For the sentence.
+    pose : tuple of float
+        x, y (in 3-D: x, y, z) [m, map] and, if `headings`, yaw [rad].
+    headings : bool, default False
+        Whether an outline is looked at as it is turned, or the disc around it.
 
     Raises
     ------
     NonFreeError, UnknownSpaceError
     """
+    xy, yaw = _place_and_yaw(space, pose, headings=headings)
     cell = tuple(np.floor(space.to_cells(xy)[0]).astype(np.int64)[::-1])
     unknown = space.blocked & ~space.nonfree
     checks = [(space.nonfree, NonFreeError), (unknown, UnknownSpaceError)]
     if unknown[cell]:
         checks.reverse()
     for blocked, error in checks:
-        distance = space.clearance_of(xy, to=blocked)
-        if distance < space.radius - SLACK or blocked[cell]:
-            nearest = nearest_place(space, xy)
-            raise error(place, xy, clearance=distance, needed=space.radius, nearest=nearest)
+        if not _fits(space, blocked, xy, yaw):
+            raise error(
+                place,
+                xy,
+                clearance=space.clearance_of(xy, to=blocked),
+                needed=space.radius,
+                nearest=nearest_place(space, xy, yaw=yaw),
+                yaw=yaw,
+            )
 
 
-def nearest_place(space: Space, xy: Point) -> Point | None:
-    """Return the cell centre nearest to a place where the footprint fits, or None [m, map]."""
-    cells = np.argwhere(space.stand)
-    if len(cells) == 0:
-        return None
-    centres: Floats = space.window.cell_to_world(cells)
-    nearest = centres[np.linalg.norm(centres - xy, axis=1).argmin()]
-    return tuple(nearest.tolist())
+def nearest_place(space: Space, xy: Point, *, yaw: float | None = None) -> Point | None:
+    """Return the cell centre nearest to a place where the footprint fits, or None [m, map].
+
+    With a yaw [rad], the outline fits that is turned so; else, the disc around it.
+    """
+    open_cells = space.stand if yaw is None else ~space.blocked
+    centres: Floats = space.window.cell_to_world(np.argwhere(open_cells))
+    order = np.argsort(np.linalg.norm(centres - xy, axis=1), kind="stable")
+    for index in order:
+        centre: Point = tuple(centres[index].tolist())
+        if yaw is None or _fits(space, space.blocked, centre, yaw):
+            return centre
+    return None
 
 
-def _seen(problem: PlanningProblem) -> Costmap | Voxels:
+def _place_and_yaw(space: Space, pose: Pose, *, headings: bool) -> tuple[Point, float | None]:
+    ndim = space.blocked.ndim
+    turned = headings and not space.problem.shape.is_disc and len(pose) > ndim
+    return pose[:ndim], pose[ndim] if turned else None
+
+
+def _fits(space: Space, blocked: Bools, xy: Point, yaw: float | None) -> bool:
+    polygon = space.problem.shape.polygon
+    position = space.to_cells(xy)[0]
+    if yaw is None or polygon is None:
+        cell = tuple(np.floor(position).astype(np.int64)[::-1])
+        return not blocked[cell] and space.clearance_of(xy, to=blocked) >= space.radius - SLACK
+    x, y = position.tolist()
+    corners = polygon / space.window.resolution
+    return bool(pose_clear(blocked, corners, x, y, math.cos(yaw), math.sin(yaw)))
+
+
+def space_of(problem: PlanningProblem) -> Costmap | Voxels:
+    """Return the map as a problem sees it: a costmap, or voxels."""
     return Costmap.of(problem) if problem.grid.ndim == 2 else Voxels.of(problem)
 
 

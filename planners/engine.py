@@ -10,7 +10,7 @@ from pydantic import Field
 from groundmap.arrays import Floats
 from groundmap.settings import Settings
 from planners.costmap import Costmap
-from planners.errors import TimeLimitError
+from planners.errors import ProblemError, TimeLimitError
 
 SLICE = 100_000  # expansions between two looks at the clock: about 20 ms
 
@@ -52,6 +52,23 @@ class Engine(Protocol):
             Time ran out; with a limit of 0, always.
         """
         ...
+
+
+def check_uniform(planner: str, costmap: Costmap) -> None:
+    """Check that every metre of a costmap costs the same.
+
+    Raises
+    ------
+    ProblemError
+        The planner needs that; the sentence names one that doesn't.
+    """
+    if not costmap.uniform:
+        raise ProblemError(
+            "planner",
+            f"uniform costs, which {planner!r} needs",
+            "cells that cost more than others",
+            hint="Take 'astar', which heeds them.",
+        )
 
 
 class Clock:

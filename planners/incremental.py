@@ -11,13 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from groundmap.arrays import Floats, Ints
-from planners.answers import answer, check_on_map, check_space
+from planners.answers import check_on_map
 from planners.costmap import Costmap
 from planners.dstar_lite import DStarLite, DStarLiteSettings
-from planners.enclosure import enclosed
 from planners.errors import Point, ProblemError
 from planners.problem import PlanningProblem
 from planners.route import Route
+from planners.solve import solve
 
 
 class IncrementalPlanner:
@@ -70,7 +70,7 @@ class IncrementalPlanner:
         Parameters
         ----------
         changed : array_like of int, shape (n, 2)
-            Cells [row, col] of the grid, as `groundmap.GroundMapper.integrate` returns them;
+            Cells [row, col] of the grid, such as `groundmap.GroundMapper.changed`;
             cells that the map did not have before among them.
         """
         if self._costmap is not None:
@@ -112,14 +112,7 @@ class IncrementalPlanner:
         )
         check_on_map(self.problem)
         costmap = self._costmap = self._costmap_now()
-        check_space(costmap, "start", self.problem.start_xy)
-        check_space(costmap, "goal", self.problem.goal_xy)
-        engine = self._engine_on(costmap)
-        found = engine.search(self.problem.start_xy, self.problem.goal_xy, self.settings)
-        if found is None:
-            raise enclosed(costmap)
-        seconds = time.perf_counter() - began
-        return answer(costmap, found, planner=engine.name, seconds=seconds)
+        return solve(costmap, self._engine_on(costmap), self.settings, began=began)
 
     def _engine_on(self, costmap: Costmap) -> DStarLite:
         if self._engine is None:
@@ -148,7 +141,7 @@ def _unknown_cells(costmap: Costmap) -> Ints:
     """Return cells near the start, and that of the goal, if unknown or beyond the window."""
     problem, window = costmap.problem, costmap.window
     reach = problem.clear_radius if problem.clear_start else 0.0
-    corners = [np.array(problem.start_xy) - reach, np.array(problem.start_xy) + reach]
+    corners = [np.array(problem.clear_place) - reach, np.array(problem.clear_place) + reach]
     first, last = window.world_to_cell(corners)
     around = np.argwhere(np.ones(last - first + 1)) + first
     cells = np.concatenate([around, window.world_to_cell(problem.goal_xy)])

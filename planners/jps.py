@@ -9,8 +9,7 @@ import numpy as np
 from groundmap.arrays import Bools, Ints
 from planners.costmap import Costmap
 from planners.ends import Ends, ends_of, waypoints_through
-from planners.engine import Clock, Found, Pose, SearchSettings
-from planners.errors import ProblemError
+from planners.engine import Clock, Found, Pose, SearchSettings, check_uniform
 from planners.kernels.astar import EXHAUSTED, EXPANDED, FAR, FOUND, HEAP_FULL, ROOT, SIZE, TARGET
 from planners.kernels.astar import estimate as estimated
 from planners.kernels.heap import push
@@ -48,13 +47,7 @@ class JPS:
     name: ClassVar[str] = "jps"
 
     def __init__(self, costmap: Costmap) -> None:
-        if not costmap.uniform:
-            raise ProblemError(
-                "planner",
-                f"uniform costs, which {self.name!r} needs",
-                "cells that cost more than others",
-                hint="Take 'astar', which heeds them.",
-            )
+        check_uniform(self.name, costmap)
         self.costmap = costmap
         self.labels = np.zeros((costmap.stand.size, 2), dtype=np.int64)
         self.query = 0

@@ -59,4 +59,5 @@ def is_clear(costmap: Costmap, a: Point, b: Point, *, radius: float) -> bool:
     if costmap.blocked[low : high + 1, left : right + 1].any():
         return False
     need = (radius - SLACK) / costmap.window.resolution
-    return segment_clearance(costmap.blocked, *a, *b, math.inf) >= need
+    (ax, ay), (bx, by) = a, b
+    return segment_clearance(costmap.blocked, ax, ay, bx, by, math.inf) >= need

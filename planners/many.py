@@ -11,14 +11,14 @@ from queue import SimpleQueue
 from typing import Any, NamedTuple, TypeAlias
 
 from groundmap.arrays import Floats
-from planners.answers import answer, check_on_map, check_space
+from planners.answers import check_on_map
 from planners.costmap import Costmap
-from planners.enclosure import enclosed
 from planners.engine import Engine, SearchSettings
 from planners.errors import NoRouteError, ProblemError
 from planners.problem import PlanningProblem
 from planners.registry import Planner, named
 from planners.route import Route
+from planners.solve import solve
 
 Pair: TypeAlias = Sequence[Sequence[float] | Floats] | Floats  #: a start and a goal
 
@@ -29,6 +29,7 @@ class _Desk(NamedTuple):
     costmap: Costmap
     engines: SimpleQueue[Engine]
     settings: SearchSettings
+    headings: bool
     audited: bool
 
 
@@ -100,7 +101,7 @@ def plan_many(
     costmap = Costmap.of(problems[0])
     for name in ("moves", "steps", "clearance"):  # worked out by one thread, not by each
         getattr(costmap, name)
-    desk = _Desk(costmap, _engines(chosen, costmap, workers), options, audit)
+    desk = _Desk(costmap, _engines(chosen, costmap, workers), options, chosen.headings, audit)
     with ThreadPoolExecutor(workers) as pool:
         return list(pool.map(lambda asked: _answer(desk, asked), problems))
 
@@ -156,18 +157,15 @@ def _answer(desk: _Desk, problem: PlanningProblem) -> Route | NoRouteError:
 
 def _route(desk: _Desk, engine: Engine, problem: PlanningProblem) -> Route:
     began = time.perf_counter()
-    costmap = _posed(desk.costmap, problem)
     check_on_map(problem)
-    check_space(costmap, "start", problem.start_xy)
-    check_space(costmap, "goal", problem.goal_xy)
-    found = engine.search(tuple(problem.start), tuple(problem.goal), desk.settings)
-    if found is None:
-        raise enclosed(costmap)
-    seconds = time.perf_counter() - began
-    if desk.audited:
-        return answer(costmap, found, planner=engine.name, seconds=seconds)
-    route = Route.along(costmap, found, planner=engine.name, seconds=seconds)
-    return replace(route, audit="skipped")
+    return solve(
+        _posed(desk.costmap, problem),
+        engine,
+        desk.settings,
+        began=began,
+        headings=desk.headings,
+        audited=desk.audited,
+    )
 
 
 def _posed(costmap: Costmap, problem: PlanningProblem) -> Costmap:

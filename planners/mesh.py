@@ -186,14 +186,16 @@ def _triangles(points: Floats, outlines: Ints, squares: Bools) -> tuple[Ints, In
     All is on a lattice, and outlines meet in vertices only: what `groundmap.triangulation` does
     for points that nearly coincide and segments that cross is not needed, nor its time.
     """
-    inner = np.unique(outlines)
-    if len(inner) == 0:
+    if len(outlines) == 0:
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    on_outline = np.zeros(len(points), dtype=np.bool_)
+    on_outline[outlines] = True
+    inner = np.flatnonzero(on_outline)
     library = cdt.Triangulation(
         cdt.VertexInsertionOrder.AUTO, cdt.IntersectingConstraintEdges.NOT_ALLOWED, 0.0
     )
     vertices: Any = np.ascontiguousarray(points[inner])  # Any: its stubs want a Buffer
-    pairs: Any = np.searchsorted(inner, outlines).astype(np.uintc)
+    pairs: Any = (np.cumsum(on_outline) - 1)[outlines].astype(np.uintc)
     library.insert_vertices(vertices)
     library.insert_edges(pairs)
     library.erase_super_triangle()

@@ -10,8 +10,7 @@ import numpy as np
 from groundmap.arrays import Floats, Ints
 from planners.costmap import Costmap
 from planners.ends import ends_of, waypoints_through
-from planners.engine import SLICE, Clock, Found, Pose, SearchSettings
-from planners.errors import ProblemError
+from planners.engine import SLICE, Clock, Found, Pose, SearchSettings, check_uniform
 from planners.kernels.astar import EXHAUSTED, FAR, FOUND, HEAP_FULL, ONE, SLICE_DONE
 from planners.kernels.polyanya import advance, enqueue, trace
 from planners.kernels.polyanya_mesh import open_ways
@@ -73,13 +72,7 @@ class Polyanya:
     name: ClassVar[str] = "polyanya"
 
     def __init__(self, costmap: Costmap) -> None:
-        if not costmap.uniform:
-            raise ProblemError(
-                "planner",
-                f"uniform costs, which {self.name!r} needs",
-                "cells that cost more than others",
-                hint="Take 'astar', which heeds them.",
-            )
+        check_uniform(self.name, costmap)
         self.costmap = costmap
         self.pool = _pool(FIRST_ROOM)
 

@@ -85,7 +85,8 @@ def merged(points: Floats) -> Floats:
     steps = np.diff(line, axis=0)
     (ax, ay), (bx, by) = steps[:-1].T, steps[1:].T
     turns = (ax * by != ay * bx) | (ax * bx + ay * by <= 0)
-    return line[np.concatenate([[True], turns, [True]])]
+    turned: Floats = line[np.concatenate([[True], turns, [True]])]
+    return turned
 
 
 def crossed(points: Floats) -> Crossed:

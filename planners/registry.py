@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import Any, NamedTuple
 
-from planners.answers import answer, space_of
+from planners.answers import check_on_map, space_of
 from planners.ara import ARA, ARASettings
 from planners.astar import (
     AStar,
@@ -18,8 +18,6 @@ from planners.astar import (
 from planners.astar3d import AStar3D
 from planners.auto import Auto, AutoSettings
 from planners.dstar_lite import DStarLite, DStarLiteSettings
-from planners.enclosure import enclosed
-from planners.enclosure3d import enclosed_3d
 from planners.engine import Engine, SearchSettings
 from planners.errors import ProblemError
 from planners.hybrid import HybridAStar, HybridAStarSettings
@@ -27,6 +25,7 @@ from planners.jps import JPS, JPSPlus, JPSPlusSettings, JPSSettings
 from planners.polyanya import Polyanya, PolyanyaSettings
 from planners.problem import PlanningProblem
 from planners.route import Route
+from planners.solve import solve
 from planners.theta import LazyTheta, LazyThetaSettings, Theta, ThetaSettings
 from planners.voxels import Voxels
 
@@ -34,10 +33,11 @@ SPATIAL = ("astar", "auto")  # planners that plan on 3-D maps, too
 
 
 class Planner(NamedTuple):
-    """A planner: its engine, and the class of its settings."""
+    """A planner: its engine, the class of its settings, and whether it heeds headings."""
 
     engine: type[Engine]
     settings: type[SearchSettings]
+    headings: bool = False
 
 
 PLANNERS: dict[str, Planner] = {
@@ -46,7 +46,7 @@ PLANNERS: dict[str, Planner] = {
     "auto": Planner(Auto, AutoSettings),
     "dijkstra": Planner(Dijkstra, DijkstraSettings),
     "dstar_lite": Planner(DStarLite, DStarLiteSettings),
-    "hybrid_astar": Planner(HybridAStar, HybridAStarSettings),
+    "hybrid_astar": Planner(HybridAStar, HybridAStarSettings, headings=True),
     "jps": Planner(JPS, JPSSettings),
     "jps+": Planner(JPSPlus, JPSPlusSettings),
     "lazy_theta": Planner(LazyTheta, LazyThetaSettings),
@@ -93,28 +93,20 @@ def plan(problem: PlanningProblem, planner: str = "astar", **settings: Any) -> R
     ([2.0, 2.0], 2.0, 'clean')
     """
     began = time.perf_counter()
-    engine_class, settings_class = named(planner)
-    chosen = settings_class(**settings)
+    entry = named(planner)
+    chosen = entry.settings(**settings)
+    check_on_map(problem)
     space = space_of(problem)
     if isinstance(space, Voxels):
-        return _plan_3d(space, planner, chosen, began)
-    engine = engine_class(space)
-    found = engine.search(tuple(problem.start), tuple(problem.goal), chosen)
-    if found is None:
-        raise enclosed(space)
-    return answer(space, found, planner=engine.name, seconds=time.perf_counter() - began)
+        return solve(space, _engine_3d(space, planner), chosen, began=began)
+    return solve(space, entry.engine(space), chosen, began=began, headings=entry.headings)
 
 
-def _plan_3d(space: Voxels, planner: str, settings: SearchSettings, began: float) -> Route:
+def _engine_3d(space: Voxels, planner: str) -> AStar3D:
     if planner not in SPATIAL:
         expected = f"one that plans on 3-D maps: {', '.join(SPATIAL)}"
         raise ProblemError("planner", expected, repr(planner))
-    problem = space.problem
-    engine = AStar3D(space)
-    found = engine.search(tuple(problem.start), tuple(problem.goal), settings)
-    if found is None:
-        raise enclosed_3d(space)
-    return answer(space, found, planner=engine.name, seconds=time.perf_counter() - began)
+    return AStar3D(space)
 
 
 def named(planner: str) -> Planner:

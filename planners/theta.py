@@ -9,8 +9,7 @@ import numpy as np
 from groundmap.arrays import Floats, Ints
 from planners.costmap import Costmap
 from planners.ends import ends_of, waypoints_through
-from planners.engine import SLICE, Clock, Found, Pose, SearchSettings
-from planners.errors import ProblemError
+from planners.engine import SLICE, Clock, Found, Pose, SearchSettings, check_uniform
 from planners.kernels.astar import (
     EXHAUSTED,
     EXPANDED,
@@ -62,13 +61,7 @@ class Theta:
     lazy: ClassVar[bool] = False
 
     def __init__(self, costmap: Costmap) -> None:
-        if not costmap.uniform:
-            raise ProblemError(
-                "planner",
-                f"uniform costs, which {self.name!r} needs",
-                "cells that cost more than others",
-                hint="Take 'astar', which heeds them.",
-            )
+        check_uniform(self.name, costmap)
         self.costmap = costmap
         self.costs = np.zeros(costmap.stand.size)
         self.marks = np.zeros((costmap.stand.size, 2), dtype=np.int64)

@@ -14,7 +14,8 @@ from groundmap.grid import ConfidenceGrid
 from oracles_planning import BLOCKED, FREE, free_field, grid_of
 from planners import EnclosedError, NonFreeError, PlanningProblem, Route, plan
 from planners.costmap import Costmap
-from planners.enclosure import enclosed, reachable, widest_route
+from planners.enclosure import enclosed, widest_route
+from planners.fields import reachable
 from planners.widest import WidestRoute
 from strategies import rngs
 

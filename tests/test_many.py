@@ -164,7 +164,7 @@ def test_a_malformed_pair_is_refused_by_its_number(pair: Any, sentence: str) -> 
 
 
 def test_what_is_wrong_with_all_queries_is_raised() -> None:
-    with pytest.raises(ProblemError, match=r"planner: expected one of astar.*got 'astral'"):
+    with pytest.raises(ProblemError, match=r"planner: expected one of ara, astar, .* got 'astral'"):
         plan_many(problem_of(0), [], "astral")
     with pytest.raises(SettingsError, match="Did you mean 'time_limit'"):
         plan_many(problem_of(0), [], "astar", time_limt=3)

@@ -23,6 +23,7 @@ from planners import (
     TimeLimitError,
     plan,
 )
+from planners.costmap import Costmap
 
 EXACT = ["astar", "auto", "ara", "dijkstra", "dstar_lite", "jps", "jps+"]
 ANY_ANGLE = ["theta", "lazy_theta", "polyanya"]
@@ -141,7 +142,7 @@ def test_planners_that_cannot_weigh_cells_refuse_to(planner: str) -> None:
         footprint=1.0,
         costs=CostSettings(clearance_weight=1.0),
     )
-    with pytest.raises(ProblemError, match=r"(?s)uniform.*astar"):
+    with pytest.raises(ProblemError, match="'?astar"):
         plan(problem, planner)
 
 
@@ -167,4 +168,7 @@ def test_no_time_is_no_route(planner: str) -> None:
 @pytest.mark.parametrize("planner", sorted(PLANNERS))
 def test_a_planner_is_called_by_its_name(planner: str) -> None:
     if planner != "auto":
-        assert PLANNERS[planner].engine.name == planner
+        problem = PlanningProblem(
+            grid_of(free_field(9, 9)), start=(2, 2), goal=(5, 5), footprint=1.0
+        )
+        assert PLANNERS[planner].engine(Costmap.of(problem)).name == planner

@@ -66,7 +66,7 @@ def test_a_problem_that_cannot_be_posed_is_refused(values: dict[str, Any], sente
 
 
 def test_an_unknown_planner_is_refused_with_what_there_is() -> None:
-    with pytest.raises(ProblemError, match=r"planner: expected one of astar.*, got 'astral'"):
+    with pytest.raises(ProblemError, match=r"planner: expected one of ara, astar, .*, got 'astral'"):
         plan(problem(), "astral")
     assert "astar" in PLANNERS
 
@@ -249,3 +249,31 @@ def test_every_failure_is_a_planning_error() -> None:
     for error in (ProblemError, NoRouteError):
         assert issubclass(error, PlanningError)
     assert issubclass(ProblemError, ValueError)
+
+
+CAR = [(-0.5, -0.6), (2.5, -0.6), (2.5, 0.6), (-0.5, 0.6)]
+
+
+def beside_a_wall(yaw: float, **values: Any) -> PlanningProblem:
+    """Return the problem to drive a car along a wall whose face is at y = 10, 0.8 m beside it."""
+    z = free_field(64, 64)
+    z[:10] = BLOCKED
+    asked = {"start": (9.0, 10.8, yaw), "goal": (40.0, 10.8, 0.0), "footprint": CAR}
+    return problem(grid_of(z), **(asked | values))
+
+
+def test_an_outline_is_looked_at_as_it_is_turned_by_planners_that_turn_it() -> None:
+    route = plan(beside_a_wall(0.0), "hybrid_astar")
+    assert route.length == pytest.approx(31.0)
+    with pytest.raises(NonFreeError, match=r"start \(9.00, 10.80\): the footprint \(radius 2.57"):
+        plan(beside_a_wall(0.0), "astar")
+
+
+def test_an_outline_that_does_not_fit_as_it_is_turned_is_named_with_its_yaw() -> None:
+    sentence = r"start \(9.00, 10.80\): the footprint, turned by -1.57 rad, overlaps non-free"
+    with pytest.raises(NonFreeError, match=sentence) as caught:
+        plan(beside_a_wall(-np.pi / 2), "hybrid_astar")
+    assert caught.value.nearest == (8.5, 12.5)
+    assert caught.value.yaw == -np.pi / 2
+    moved = beside_a_wall(-np.pi / 2, start=(*caught.value.nearest, -np.pi / 2))
+    assert plan(moved, "hybrid_astar").audit == "clean"

@@ -251,7 +251,7 @@ def test_costs_are_refused() -> None:
     costs = CostSettings(clearance_weight=1.0)
     grid = grid_of(free_field(8, 8))
     problem = PlanningProblem(grid, start=(4, 4), goal=(5, 5), footprint=1.0, costs=costs)
-    with pytest.raises(ProblemError, match="which 'polyanya' needs.*Take 'astar'"):
+    with pytest.raises(ProblemError, match=r"which 'polyanya' needs.*Take 'astar'"):
         Polyanya(Costmap.of(problem))
 
 

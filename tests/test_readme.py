@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from groundmap import fit_ground, read_views
+from planners import PLANNERS
 from planners.cli import app
 
 README = Path(__file__).parents[1] / "README.md"
@@ -26,14 +27,27 @@ def blocks(language: str = "") -> list[str]:
     ]
 
 
-def test_the_first_example_prints_its_answer() -> None:
-    (code,) = blocks("python")
+def examples() -> list[tuple[str, str]]:
+    """Return the examples in Python, each with the block after it, which is what it prints."""
+    text = README.read_text(encoding="utf-8") if README.is_file() else ""
+    return re.findall(r"```python\n(.*?)```\s+```\n(.*?)```", text, re.DOTALL)
+
+
+@pytest.mark.parametrize(("code", "answer"), examples(), ids=["first", "planners"])
+def test_an_example_prints_its_answer(code: str, answer: str) -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == blocks()[1]
+    assert done.stdout == answer
+
+
+def test_every_planner_is_in_the_table() -> None:
+    _, _, section = README.read_text(encoding="utf-8").partition("| planner |")
+    rows = section.partition("\n\n")[0]
+    listed = re.findall(r"`([^`]+)`", "\n".join(row.split("|")[1] for row in rows.split("\n")[2:]))
+    assert sorted(listed) == sorted(PLANNERS)
 
 
 def test_the_first_example_has_ten_lines_at_most() -> None:
-    (code,) = blocks("python")
+    code = blocks("python")[0]
     assert len([line for line in code.splitlines() if line.strip()]) <= 10
 
 

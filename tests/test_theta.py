@@ -202,5 +202,5 @@ def test_costs_are_refused(engine: type[Theta], options: ThetaSettings) -> None:
     costs = CostSettings(clearance_weight=1.0)
     grid = grid_of(free_field(8, 8))
     problem = PlanningProblem(grid, start=(4, 4), goal=(5, 5), footprint=1.0, costs=costs)
-    with pytest.raises(ProblemError, match=f"which '{engine.name}' needs.*Take 'astar'"):
+    with pytest.raises(ProblemError, match=rf"which '{engine.name}' needs.*Take 'astar'"):
         engine(Costmap.of(problem))
