@@ -129,7 +129,7 @@ def nearest_place(space: Space, xy: Point, *, yaw: float | None = None) -> Point
     """
     open_cells = space.stand if yaw is None else ~space.blocked
     centres: Floats = space.window.cell_to_world(np.argwhere(open_cells))
-    order = np.argsort(np.linalg.norm(centres - xy, axis=1), kind="stable")
+    order = np.argsort(np.hypot.reduce(centres - xy, axis=1), kind="stable")
     for index in order:
         centre: Point = tuple(centres[index].tolist())
         if yaw is None or _fits(space, space.blocked, centre, yaw):
@@ -166,6 +166,6 @@ def _touches_tile(problem: PlanningProblem, xy: Point, margin: float) -> bool:
     for index, _ in grid.tiles():
         first = np.array(index)[::-1]
         away = np.maximum(np.maximum(first - position, position - first - 1), 0.0)
-        if np.linalg.norm(away) * side <= margin:
+        if math.hypot(*away) * side <= margin:
             return True
     return False

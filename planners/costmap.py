@@ -15,7 +15,7 @@ from planners.costs import MAX_NON_OBSTACLE
 from planners.kernels.astar import DIAGONAL, ONE
 from planners.kernels.clearance import line_clearance
 from planners.kernels.distance import NOWHERE, squared_distances
-from planners.lattice import allowed_moves, squared_clearance, squared_need
+from planners.lattice import allowed_moves, squared_need
 from planners.layers import Layers, cap, layers_of, metres, padded_window
 from planners.problem import PlanningProblem
 
@@ -162,11 +162,6 @@ class Costmap:
     def clearance(self) -> Floats:
         """Distance from cell centres to the nearest blocked square, shape (rows, cols) [m]."""
         return metres(self.all_squared, self.window.resolution)
-
-    @cached_property
-    def lattice(self) -> Ints:
-        """Squared clearance on the half-cell lattice, shape (2 rows + 1, 2 cols + 1)."""
-        return squared_clearance(self.blocked)
 
     def stand_for(self, radius: float) -> Bools:
         """Return where the centre of a disc of another radius [m] may be, shape (rows, cols)."""

@@ -1,4 +1,4 @@
-"""Exact clearance on the half-cell lattice, and the moves it allows.
+"""The half-cell lattice: what exact clearance is on it, and the moves it allows.
 
 The lattice of a map of r x c cells has (2 r + 1) x (2 c + 1) points: the corners, edge midpoints
 and centres of the cells; the centre of cell [row, col] is point [2 row + 1, 2 col + 1]. A blocked
@@ -19,42 +19,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy import ndimage
 
-from groundmap.arrays import Bools, Bytes, Ints
-from planners.kernels.distance import NOWHERE
+from groundmap.arrays import Bools, Bytes
 
 ROUNDING = 1e-12  # relative error granted to the radius: 2 * 0.3 / 0.1 is not quite 6
-
-
-def squared_clearance(blocked: Bools) -> Ints:
-    """Return the squared distance of every lattice point to the nearest blocked square.
-
-    Parameters
-    ----------
-    blocked : ndarray of bool, shape (rows, cols)
-
-    Returns
-    -------
-    ndarray of int64, shape (2 rows + 1, 2 cols + 1) [(half cells)²]
-        `NOWHERE` throughout if no cell is blocked.
-
-    Examples
-    --------
-    >>> squared_clearance(np.array([[True, False]]))
-    array([[0, 0, 0, 1, 4],
-           [0, 0, 0, 1, 4],
-           [0, 0, 0, 1, 4]])
-    """
-    rows, cols = blocked.shape
-    clear = np.ones((2 * rows + 1, 2 * cols + 1), dtype=np.bool_)
-    for i, j in np.ndindex(3, 3):
-        clear[i : i + 2 * rows : 2, j : j + 2 * cols : 2] &= ~blocked
-    if clear.all():
-        return np.full(clear.shape, NOWHERE, dtype=np.int64)
-    distance = ndimage.distance_transform_edt(clear)
-    squared: Ints = np.rint(distance * distance).astype(np.int64)
-    return squared
 
 
 def squared_need(radius: float, resolution: float) -> int:

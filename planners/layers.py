@@ -75,6 +75,14 @@ def padded_window(problem: PlanningProblem) -> GridWindow:
         bounds[2:] = np.maximum(bounds[2:], start + problem.clear_radius)
     # One cell and a half: borders that rounding moves by a cell must not swallow the ring.
     ring = 1.5 * grid.resolution * np.array([-1, -1, 1, 1])
+    mapped = float(np.prod((grid.bounds()[2:] - grid.bounds()[:2]) / grid.resolution))
+    if mapped > MOST_CELLS:
+        raise ProblemError(
+            "grid",
+            f"a box of {MOST_CELLS} cells around the touched tiles at most",
+            f"{mapped:.3g}",
+            hint="Map with larger cells.",
+        )
     cells = float(np.prod((bounds[2:] - bounds[:2]) / grid.resolution))
     if cells > MOST_CELLS:
         raise ProblemError(

@@ -24,7 +24,8 @@ from planners import CostSettings, PlanningProblem
 from planners.costmap import Costmap
 from planners.kernels.astar import COLS, ROWS
 from planners.kernels.distance import NOWHERE, squared_distances
-from planners.lattice import allowed_moves, squared_clearance, squared_need
+from planners.kernels.lattice import squared_clearance
+from planners.lattice import allowed_moves, squared_need
 from planners.problem import Unknown
 
 

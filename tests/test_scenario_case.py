@@ -76,6 +76,9 @@ goal = [5, 1, 1.5]
 footprint = 0.3
 robot_radius = 0.25
 expect = "EnclosedError"
+reason = "fenced in"
+unknown = "allow"
+time_limit = 0.5
 planner = "astar"
 max_ratio = 1.2
 
@@ -83,7 +86,7 @@ max_ratio = 1.2
 name = "back"
 start = [5, 1]
 goal = [1, 1]
-footprint = 0.3
+footprint = [[-0.3, -0.2], [0.4, -0.2], [0.4, 0.2], [-0.3, 0.2]]
 
 [bounds]
 free_recall = { min = 0.9 }
@@ -133,10 +136,16 @@ def test_all_that_a_file_says_is_taken_over(tmp_path: Path) -> None:
         footprint=0.3,
         robot_radius=0.25,
         expect="EnclosedError",
+        reason="fenced in",
+        unknown="allow",
+        time_limit=0.5,
         planner="astar",
         max_ratio=1.2,
     )
     assert (back.expect, back.robot_radius, back.max_ratio) == ("route", None, None)
+    assert (back.reason, back.unknown, back.time_limit) == (None, "avoid", None)
+    assert there.radius == 0.3
+    assert back.radius == pytest.approx(np.hypot(0.4, 0.2))
     assert scenario.bounds == {
         "free_recall": Bound(min=0.9),
         "false_free": Bound(max=0.1),

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -156,6 +158,35 @@ def test_an_error_that_is_not_expected_fails_with_its_reason(tmp_path: Path) -> 
     assert "fenced in" in missed
 
 
+def test_the_sentence_of_an_error_holds_the_reason_that_is_expected(tmp_path: Path) -> None:
+    expected = 'expect = "EnclosedError"\nreason = '
+    into: dict[str, Any] = {"start": (1.5, 2), "goal": (5, 2)}
+    right = query("right", **into, more=expected + r"'fenced in: .* \d+\.\d m²'")
+    wrong = query("wrong", **into, more=expected + '"too narrow"')
+    outcome = run_scenario(write(tmp_path, ROOMS + right + wrong))
+    assert str(outcome.figures["right.reason"]).startswith("no route: the goal is fenced in: ")
+    (missed,) = outcome.missed
+    assert re.fullmatch(r"wrong\.reason is no route: .*, not with 'too narrow' in it", missed)
+
+
+def test_time_and_unknown_space_are_the_querys_to_tell(tmp_path: Path) -> None:
+    unseen: dict[str, Any] = {"start": (1.5, 2), "goal": (0.5, 0.5)}
+    queries = (
+        query("hurried", more='expect = "TimeLimitError"\ntime_limit = 0.0'),
+        query("known", **unseen, footprint=0.1, more='expect = "UnknownSpaceError"'),
+        query("guess", **unseen, footprint=0.1, more='unknown = "allow"'),
+    )
+    assert run_scenario(write(tmp_path, HALL + "".join(queries))).missed == ()
+
+
+def test_an_outline_is_planned_with_as_a_footprint(tmp_path: Path) -> None:
+    outline = [[-0.1, -0.1], [0.5, -0.1], [0.5, 0.1], [-0.1, 0.1]]
+    text = HALL + query().replace("footprint = 0.3", f"footprint = {outline}")
+    outcome = run_scenario(write(tmp_path, text))
+    assert outcome.missed == ()
+    assert number(outcome, "along.min_clearance") >= math.hypot(0.5, 0.1) - 1e-9
+
+
 def test_a_route_where_an_error_is_expected_fails(tmp_path: Path) -> None:
     text = HALL + query(more='expect = "EnclosedError"')
     outcome = run_scenario(write(tmp_path, text))
@@ -165,8 +196,15 @@ def test_a_route_where_an_error_is_expected_fails(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ('planner = "astra"', "expected queries.planner to be one of astar, .*, got 'astra'"),
+        ('planner = "astra"', "expected queries.planner to be one of .*astar, .*, got 'astra'"),
         ('expect = "Enclosed"', "expected expect to be .*'EnclosedError'.*, got 'Enclosed'"),
+        ('reason = "why"', "expected queries.reason to be none where a route is expected"),
+        (
+            'expect = "EnclosedError"\nreason = "("',
+            r"expected queries.reason to be a regular expression \(.*\), got '\('",
+        ),
+        ('unknown = "perhaps"', "expected unknown to be 'avoid', 'allow' or 'penalise'"),
+        ("time_limit = -1", "expected time_limit to be greater than or equal to 0"),
     ],
 )
 def test_a_query_for_what_does_not_exist_is_refused(
@@ -174,6 +212,18 @@ def test_a_query_for_what_does_not_exist_is_refused(
 ) -> None:
     with pytest.raises(FileFormatError, match=message):
         run_scenario(write(tmp_path, HALL + query(more=line)))
+
+
+@pytest.mark.parametrize(
+    ("footprint", "got"),
+    [("-0.1", "-0.1"), ("[[0, 0], [1, 1], [1, 0], [0, 1]]", "one that meets itself at .*")],
+)
+def test_a_query_with_what_is_no_footprint_is_refused(
+    tmp_path: Path, footprint: str, got: str
+) -> None:
+    text = HALL + query().replace("footprint = 0.3", f"footprint = {footprint}")
+    with pytest.raises(FileFormatError, match=f"expected queries.footprint to be .*, got {got}"):
+        run_scenario(write(tmp_path, text))
 
 
 def test_a_route_that_touches_the_true_world_collides(tmp_path: Path) -> None:
@@ -308,6 +358,9 @@ def test_what_is_no_scenario_is_refused(tmp_path: Path) -> None:
         (Bound(equals="route"), "route", True),
         (Bound(equals="route"), "EnclosedError", False),
         (Bound(equals="route"), None, False),
+        (Bound(matches=r"\d m wide"), "a gap 2 m wide", True),
+        (Bound(matches=r"\d m wide"), "a wide gap", False),
+        (Bound(matches="."), None, False),
         (Bound(equals=0), 0, True),
         (Bound(equals=0), None, False),
         (Bound(min=0.0), None, False),
@@ -327,6 +380,7 @@ def test_a_bound_holds_what_keeps_to_it_and_nothing_that_is_missing(
 def test_a_bound_reads_as_people_write_it() -> None:
     bounds = Bound(min=0.97), Bound(max=0), Bound(min=1, max=2.5), Bound(equals="route")
     assert [str(bound) for bound in bounds] == ["≥ 0.97", "≤ 0", "≥ 1 and ≤ 2.5", "= route"]
+    assert str(Bound(matches="fenced in")) == "with 'fenced in' in it"
 
 
 def test_a_world_of_too_many_cells_fails_with_what_to_do(

@@ -71,6 +71,8 @@ def line_clearance(blocked: Bools, points: Floats) -> float:
     best = segment_clearance(
         blocked, points[0, 0], points[0, 1], points[0, 0], points[0, 1], math.inf
     )
+    if math.isinf(best):  # the whole map was looked at
+        return best
     for i in range(len(points) - 1):
         ax, ay = points[i]
         dx, dy = points[i + 1, 0] - ax, points[i + 1, 1] - ay

@@ -39,7 +39,7 @@ def squared_distances(blocked: Bools, cap: int) -> Ints32:
     border, at = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
     starts = np.empty(room, dtype=np.int64)
     for row in range(rows):
-        size = _envelope(vertical[row], border, at, starts)
+        size = envelope(vertical[row], border, at, starts)
         k = 0
         for col in range(cols):
             x = 2 * col + 1
@@ -80,7 +80,7 @@ def _down_columns(blocked: Bools) -> Ints:
 
 
 @njit(cache=True, nogil=True)
-def _envelope(vertical: Ints, border: Ints, at: Ints, starts: Ints) -> int:
+def envelope(vertical: Ints, border: Ints, at: Ints, starts: Ints) -> int:
     """Write the lower envelope of the borders' parabolas and return how many it has.
 
     Parabola k is ``(x - at[k])² + border[k]``, the lowest from ``starts[k]`` on.

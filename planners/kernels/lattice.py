@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from groundmap.arrays import Bools, Ints32
-from planners.kernels.distance import NOWHERE, _envelope
+from planners.kernels.distance import NOWHERE, envelope
 
 
 @njit(cache=True, nogil=True)
@@ -38,7 +38,7 @@ def squared_clearance(blocked: Bools) -> Ints32:
         for col in range(cols):
             steps = np.int64(away[line, col])
             heights[col] = steps * steps if steps < far else NOWHERE
-        size = _envelope(heights, border, at, starts)
+        size = envelope(heights, border, at, starts)
         k = 0
         for x in range(2 * cols + 1):
             least = heights[x >> 1] if x & 1 else NOWHERE

@@ -62,9 +62,12 @@ resolution = 0.1524
 name = "around"
 start = [1.5, 1.2]
 goal = [8, 4.5]
-footprint = 0.3              # radius to plan with
+footprint = 0.3              # radius to plan with, or an outline: [[x, y], ...]
 robot_radius = 0.25          # what must not touch the true world
 expect = "route"             # or the error: EnclosedError, NonFreeError, UnknownSpaceError, ...
+# reason = "fenced in"       # what the error's sentence holds: a regular expression
+# unknown = "allow"          # unknown and contested space: avoid, allow or penalise
+# time_limit = 2.0           # search time
 max_ratio = 1.1              # to the best route in the true world
 
 [bounds]                     # min, max, or both, for any figure that a run prints
