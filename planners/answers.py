@@ -12,19 +12,13 @@ from planners.audit import audit
 from planners.audit3d import audit3d
 from planners.costmap import SLACK, Costmap
 from planners.engine import Found, Pose
-from planners.errors import (
-    NonFreeError,
-    OutsideMapError,
-    Place,
-    Point,
-    ProblemError,
-    UnknownSpaceError,
-)
+from planners.errors import NonFreeError, OutsideMapError, ProblemError, UnknownSpaceError
 from planners.kernels.footprint import pose_clear
 from planners.problem import PlanningProblem
 from planners.route import Route
 from planners.space import Space
 from planners.voxels import Voxels
+from planners.wording import Place, Point
 
 
 def costmap_of(problem: PlanningProblem) -> Costmap:

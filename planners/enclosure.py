@@ -9,11 +9,12 @@ import numpy as np
 from groundmap.arrays import Bools
 from planners.answers import costmap_of
 from planners.costmap import Costmap
-from planners.errors import EnclosedError, Place, Point, Turning
+from planners.errors import EnclosedError
 from planners.fields import reachable
 from planners.footprint import Footprint
 from planners.problem import PlanningProblem
 from planners.widest import WidestRoute, widest_way
+from planners.wording import Place, Point, Turning
 
 
 def enclosed(costmap: Costmap, *, needed: float | None = None) -> EnclosedError:

@@ -8,8 +8,9 @@ import numpy as np
 from scipy import ndimage
 
 from groundmap.arrays import Bools
-from planners.errors import EnclosedError, Place, Point
+from planners.errors import EnclosedError
 from planners.voxels import Voxels
+from planners.wording import Place, Point
 
 
 def enclosed_3d(voxels: Voxels) -> EnclosedError:

@@ -19,15 +19,17 @@ that don't exist or are out of range raise `groundmap.errors.SettingsError`, as 
 
 from __future__ import annotations
 
-import math
-from typing import Literal, TypeAlias
-
 from groundmap.errors import FactualError, WrongValueError
-
-Place: TypeAlias = Literal["start", "goal"]
-Turning: TypeAlias = Literal["none", "anyhow", "heeded"]
-Point: TypeAlias = tuple[float, ...]  #: x, y (on a 3-D map also z) [m, map]
-MOST_DECIMALS = 9  # of a width [m]: what is nearer is the same, up to rounding
+from planners.wording import (
+    Place,
+    Point,
+    Turning,
+    footprint_clause,
+    named_place,
+    nearest_clause,
+    shown,
+    widest_clause,
+)
 
 
 class PlanningError(FactualError):
@@ -78,8 +80,8 @@ y -9.75 to 9.75 m (box around the touched tiles); nothing was ever seen near it.
             else "which is empty"
         )
         super().__init__(
-            f"{_at(place, xy)}: outside the map: expected a place on it, {extent}; "
-            f"nothing was ever seen near it.{_instead(xy, nearest)}"
+            f"{named_place(place, xy)}: outside the map: expected a place on it, {extent}; "
+            f"nothing was ever seen near it.{nearest_clause(xy, nearest)}"
         )
 
 
@@ -106,8 +108,8 @@ class NonFreeError(NoRouteError):
         self.place, self.xy, self.clearance, self.needed = place, xy, clearance, needed
         self.nearest, self.yaw = nearest, yaw
         super().__init__(
-            f"{_at(place, xy)}: {_footprint(needed, yaw)} overlaps non-free space; "
-            f"clearance there is {clearance:.2f} m.{_instead(xy, nearest)}"
+            f"{named_place(place, xy)}: {footprint_clause(needed, yaw)} overlaps non-free space; "
+            f"clearance there is {clearance:.2f} m.{nearest_clause(xy, nearest)}"
         )
 
 
@@ -134,10 +136,10 @@ begins 0.25 m away. Map that place, or plan with unknown='allow' (--unknown allo
         self.place, self.xy, self.clearance, self.needed = place, xy, clearance, needed
         self.nearest, self.yaw = nearest, yaw
         super().__init__(
-            f"{_at(place, xy)}: {_footprint(needed, yaw)} overlaps unknown or "
+            f"{named_place(place, xy)}: {footprint_clause(needed, yaw)} overlaps unknown or "
             f"contested space, which begins {clearance:.2f} m away. "
             "Map that place, or plan with unknown='allow' (--unknown allow)."
-            f"{_instead(xy, nearest)}"
+            f"{nearest_clause(xy, nearest)}"
         )
 
 
@@ -191,13 +193,13 @@ your footprint needs 0.60 m.
         self.widest_gap, self.needed, self.bottleneck = widest_gap, needed, bottleneck
         self.turning = turning
         what = f"area of {area:.1f} m²" if len(nearest) == 2 else f"space of {area:.1f} m³"
-        way = _way(widest_gap, needed, bottleneck, turning)
+        way = widest_clause(widest_gap, needed, bottleneck, turning)
         if turning == "heeded" and widest_gap >= needed:  # nothing fences it in but its turns
             super().__init__(f"no route that can be driven: {way}")
             return
         super().__init__(
             f"no route: the {place} is fenced in: an enclosed {what} around it; the reachable "
-            f"cell nearest to the goal is {_shown(nearest)}, {distance:.2f} m away"
+            f"cell nearest to the goal is {shown(nearest)}, {distance:.2f} m away"
             f"{'; ' if way else '.'}{way}"
         )
 
@@ -263,49 +265,3 @@ class AuditError(PlanningError):
             f"audit: the route {fault} at ({xy[0]:.2f}, {xy[1]:.2f}): "
             f"expected {needed:.9g} m, got {got:.9g} m."
         )
-
-
-def _way(widest: float, needed: float, at: Point | None, turning: Turning) -> str:
-    if math.isnan(widest):
-        return ""
-    if widest == 0:
-        return "no way from start to goal exists, however narrow the footprint."
-    has, needs = _apart(widest, needed)
-    way = f"the widest way is {has} m wide{'' if at is None else f' at {_shown(at)}'}"
-    footprint = "your footprint, turned anyhow," if turning == "anyhow" else "your footprint"
-    if widest < needed:
-        return f"{way}, {footprint} needs {needs} m."
-    enough = f"{way}, enough for what {footprint} needs, {needs} m, but"
-    if turning == "heeded":
-        return f"{enough} not for its turns. Turn in smaller circles, or leave it more room."
-    return f"{enough} not along cell centres: map with smaller cells."
-
-
-def _apart(a: float, b: float) -> tuple[str, str]:
-    """Return two numbers with as many decimals as tell them apart, mostly two."""
-    for decimals in range(2, MOST_DECIMALS + 1):
-        shown = f"{a:.{decimals}f}", f"{b:.{decimals}f}"
-        if shown[0] != shown[1]:
-            return shown
-    return f"{a:.2f}", f"{b:.2f}"
-
-
-def _at(place: Place, xy: Point) -> str:
-    return f"{place} {_shown(xy)}"
-
-
-def _shown(xy: Point) -> str:
-    return f"({', '.join(f'{value:.2f}' for value in xy)})"
-
-
-def _footprint(radius: float, yaw: float | None) -> str:
-    if yaw is None:
-        return f"the footprint (radius {radius:.2f} m)"
-    return f"the footprint, turned by {yaw:.2f} rad,"
-
-
-def _instead(xy: Point, nearest: Point | None) -> str:
-    if nearest is None:
-        return ""
-    away = math.dist(xy, nearest)
-    return f" The nearest place for it is {_shown(nearest)}, {away:.2f} m away."

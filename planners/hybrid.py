@@ -11,7 +11,7 @@ from pydantic import Field
 from groundmap.arrays import Floats, Ints
 from planners.costmap import Costmap
 from planners.engine import Clock, Found, Pose, SearchSettings
-from planners.errors import Place, ProblemError
+from planners.errors import ProblemError
 from planners.hybrid_parts import (
     empty_nodes,
     factors_of,
@@ -39,6 +39,7 @@ from planners.kernels.hybrid import (
 )
 from planners.kernels.hybrid_field import seed_field
 from planners.kernels.hybrid_motion import ROOT, Drive, Prices, pieces, steering
+from planners.wording import Place
 
 SLICE = 1000  # expansions between two looks at the clock: about 20 ms
 FIRST_ROOM = 1 << 12  # nodes to begin with

@@ -14,10 +14,11 @@ from groundmap.arrays import Floats, Ints
 from planners.answers import check_on_map
 from planners.costmap import Costmap
 from planners.dstar_lite import DStarLite, DStarLiteSettings
-from planners.errors import Point, ProblemError
+from planners.errors import ProblemError
 from planners.problem import PlanningProblem
 from planners.route import Route
 from planners.solve import solve
+from planners.wording import Point
 
 
 class IncrementalPlanner:

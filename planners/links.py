@@ -9,8 +9,8 @@ import numpy as np
 
 from groundmap.arrays import Floats, Ints
 from planners.costmap import SLACK, Costmap
-from planners.errors import Point
 from planners.kernels.clearance import segment_clearance
+from planners.wording import Point
 
 
 class Links(NamedTuple):

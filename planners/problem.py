@@ -13,8 +13,9 @@ from groundmap.arrays import Floats
 from groundmap.grid import ConfidenceGrid
 from groundmap.window import EPSILON
 from planners.costs import CostSettings
-from planners.errors import Point, ProblemError
+from planners.errors import ProblemError
 from planners.footprint import Footprint
+from planners.wording import Point
 
 PLAIN = CostSettings()  # the shortest route is the best
 Unknown = Literal["avoid", "allow", "penalise"]

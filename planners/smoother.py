@@ -13,11 +13,12 @@ from groundmap.arrays import Floats
 from planners.answers import answer
 from planners.costmap import SLACK, Costmap
 from planners.engine import Found
-from planners.errors import Point, ProblemError, SmoothingError
+from planners.errors import ProblemError, SmoothingError
 from planners.kernels.smooth import free_discs, relax
 from planners.problem import PlanningProblem
 from planners.route import Route
 from planners.shortcuts import checked, cost_of, tightened
+from planners.wording import Point
 
 ROUNDS, INNER = 24, 100  # of discs found anew, and of the relaxation in between
 FEWEST, MOST = 8, 1_000_000  # pieces of a line

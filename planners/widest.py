@@ -10,7 +10,6 @@ import numpy as np
 
 from groundmap.arrays import Bools, Bytes, Floats, Ints, Ints32
 from planners.costmap import Costmap
-from planners.errors import Place, Point
 from planners.kernels import astar
 from planners.kernels.clearance import segment_clearance
 from planners.kernels.distance import NOWHERE
@@ -19,6 +18,7 @@ from planners.kernels.lattice import squared_clearance
 from planners.kernels.widest import UNIT, WIDER, spread, steps_over
 from planners.links import is_clear
 from planners.polyline import merged
+from planners.wording import Place, Point
 
 # What steps cost of which no, one, or both ends are at the narrowest: both count twice.
 STEPS = np.rint(np.array([[astar.ONE], [astar.DIAGONAL]]) * [1.0, 1.5, 2.0]).astype(np.int64)
