@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from groundmap import CellState, GroundMapper, fit_ground, read_views
+from groundmap import CellState, ConfidenceGrid, GroundMapper, fit_ground, read_views
 from groundmap.arrays import Floats, Ints
+from planners import PLANNERS, IncrementalPlanner, NonFreeError, PlanningProblem, plan
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 
@@ -97,3 +98,42 @@ def test_the_trajectory_of_the_map_is_that_of_the_drive(drive: Drive) -> None:
     steps = np.diff(trajectory[:, :2], axis=0)
     heading = np.arctan2(steps[:, 1], steps[:, 0])
     assert np.abs(heading - trajectory[:-1, 2]).max() < 0.15
+
+
+@pytest.fixture(scope="module")
+def street() -> ConfidenceGrid:
+    return map_of(DRIVES[0]).grid
+
+
+@pytest.mark.parametrize("planner", sorted(PLANNERS))
+def test_every_planner_drives_the_recorded_street(street: ConfidenceGrid, planner: str) -> None:
+    first, last = street.trajectory[[0, -1]]
+    route = plan(PlanningProblem(street, start=first, goal=last, footprint=0.9), planner)
+    assert route.audit == "clean"
+    assert route.min_clearance >= 0.9 - 1e-9
+    assert np.hypot(*(last - first)[:2]) <= route.length <= 1.05 * 69.0
+    assert route.headings[-1] == last[2]
+
+
+def test_a_car_parks_where_its_disc_has_no_place(street: ConfidenceGrid) -> None:
+    car = [(-0.5, -0.6), (2.0, -0.6), (2.0, 0.6), (-0.5, 0.6)]
+    first, last = street.trajectory[[0, -1]]
+    problem = PlanningProblem(street, start=first, goal=last, footprint=car)
+    with pytest.raises(NonFreeError, match=r"goal .* The nearest place for it is"):
+        plan(problem)
+    assert plan(problem, "hybrid_astar", turning_radius=4.0).audit == "clean"
+
+
+def test_a_route_is_planned_anew_while_the_street_is_mapped() -> None:
+    mapper, views = GroundMapper(), list(fit_ground(read_views(source_of(DRIVES[0]))))
+    for view in views[:20]:
+        mapper.integrate(view)
+    goal = mapper.grid.trajectory[-1]
+    problem = PlanningProblem(mapper.grid, start=(0.0, 0.0), goal=goal, footprint=0.6)
+    live = IncrementalPlanner(problem)
+    for view in views[20:26]:
+        mapper.integrate(view)
+        live.update(mapper.changed)
+        route, again = live.plan(), plan(problem)
+        assert route.cost == pytest.approx(again.cost, abs=1e-6)
+    assert route.expanded < again.expanded
