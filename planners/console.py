@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import os
 import sys
+import threading
 import time
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -77,6 +79,24 @@ def watched(items: Iterable[T], *, total: int, what: str) -> Iterator[T]:
         if time.monotonic() - spoke > SAY_EVERY:
             say(f"{what}: {number} of {total}")
             spoke = time.monotonic()
+
+
+@contextmanager
+def patiently(what: str, *, every: float = SAY_EVERY) -> Iterator[None]:
+    """Say on stderr, each so many seconds, that something still goes on."""
+    over = threading.Event()
+
+    def remind() -> None:
+        while not over.wait(every):
+            say(f"{what} ...")
+
+    reminder = threading.Thread(target=remind, daemon=True)
+    reminder.start()
+    try:
+        yield
+    finally:
+        over.set()
+        reminder.join()
 
 
 def seconds_since_start() -> float:

@@ -75,7 +75,7 @@ y -9.75 to 9.75 m (box around the touched tiles); nothing was ever seen near it.
             for axis, low, high in zip("xyz", bounds[:half], bounds[half:], strict=False)
         ]
         extent = (
-            f"which spans {' and '.join(spans)} (box around the touched tiles)"
+            f"which spans {', '.join(spans[:-1])} and {spans[-1]} (box around the touched tiles)"
             if bounds
             else "which is empty"
         )

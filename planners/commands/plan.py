@@ -11,8 +11,8 @@ from groundmap.archive import check_writable
 from groundmap.draw import check_picture
 from groundmap.io import load_map
 from planners.commands.options import assignments, outline
-from planners.commands.plot import draw_map
-from planners.console import JsonOption, emit, emit_rows, numbers, watched
+from planners.commands.plot import check_flat, draw_map
+from planners.console import JsonOption, emit, emit_rows, numbers, patiently, watched
 from planners.costs import CostSettings
 from planners.errors import NoRouteError, PlanningError
 from planners.problem import PlanningProblem, Unknown
@@ -88,8 +88,11 @@ def plan_command(
         check_picture(plot)
     if planner == ALL and (out is not None or settings):
         raise typer.BadParameter(f"--out and --set are for one planner, not {ALL}")
+    grid = load_map(map_file)
+    if plot is not None:
+        check_flat(grid, map_file)
     problem = PlanningProblem(
-        load_map(map_file),
+        grid,
         start=numbers("start", start, 2, 3),
         goal=numbers("goal", goal, 2, 3),
         footprint=outline(footprint),
@@ -105,11 +108,12 @@ def plan_command(
     if planner == ALL:
         _compare(problem, plot, time_limit, as_json=as_json, title=f"routes on {map_file}")
         return
-    route = plan(problem, planner, time_limit=time_limit, **assignments(settings or []))
-    if turning_radius is not None:
-        route = smooth(problem, route, turning_radius=turning_radius)
-    elif straighten:
-        route = shortcut(problem, route)
+    with patiently("planning; what was never used before is compiled now"):
+        route = plan(problem, planner, time_limit=time_limit, **assignments(settings or []))
+        if turning_radius is not None:
+            route = smooth(problem, route, turning_radius=turning_radius)
+        elif straighten:
+            route = shortcut(problem, route)
     if out is not None:
         route.save(out)
     if plot is not None:

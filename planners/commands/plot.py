@@ -53,12 +53,23 @@ def plot_command(
         emit({"out": str(picture)}, as_json=as_json, title=f"view {explain} of {map_file}")
         return
     grid = load_map(map_file)
-    if grid.ndim != 2:
-        raise InputError(str(map_file), "a 2-D map", f"one of {grid.ndim}-D")
+    check_flat(grid, map_file)
     box = None if bounds is None else np.array(numbers("bounds", bounds, 4))
     waypoints = None if route is None else _read_route(route)
     draw_map(grid, picture, bounds=box, waypoints=waypoints, footprint=footprint)
     emit({"out": str(picture)}, as_json=as_json, title=f"picture of {map_file}")
+
+
+def check_flat(grid: ConfidenceGrid, map_file: Path) -> None:
+    """Check that a map can be drawn.
+
+    Raises
+    ------
+    InputError
+        A 3-D map.
+    """
+    if grid.ndim != 2:
+        raise InputError(str(map_file), "a 2-D map, to draw it", f"one of {grid.ndim}-D")
 
 
 def draw_map(
