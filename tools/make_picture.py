@@ -1,4 +1,4 @@
-"""Draw the picture of README.md, docs/pipeline.png: from features to a route, in four steps.
+"""Draw the pictures of README.md: from features to a route in four steps; routes of all planners.
 
 `python tools/make_picture.py` maps the log that `groundmap demo` maps.
 """
@@ -10,10 +10,17 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from groundmap import GroundMapper, fit_ground, read_views
-from groundmap.draw import draw_grid, draw_route, draw_trajectory, save_figure
+from groundmap import ConfidenceGrid, GroundMapper, fit_ground, read_views
+from groundmap.draw import (
+    draw_grid,
+    draw_route,
+    draw_routes,
+    draw_trajectory,
+    new_figure,
+    save_figure,
+)
 from groundmap.draw.views import draw_fan, draw_features, draw_triangulation
-from planners import PlanningProblem, plan
+from planners import PLANNERS, PlanningProblem, plan
 from planners.commands.demo import FOOTPRINT, GOAL
 
 ROOT = Path(__file__).parent.parent
@@ -57,6 +64,19 @@ def main() -> None:
         ax.set(xlim=VIEW_BOUNDS[::2], ylim=VIEW_BOUNDS[1::2])
         ax.plot(0.0, 0.0, "^", color="0.1", markersize=7)
     save_figure(figure, ROOT / "docs" / "pipeline.png", dpi=100)
+    draw_planners(mapper.grid)
+
+
+def draw_planners(grid: ConfidenceGrid) -> None:
+    """Draw what every planner makes of the way through the courtyard's doorway."""
+    start = grid.trajectory[0]
+    problem = PlanningProblem(grid, start=start, goal=(*GOAL, 0.0), footprint=FOOTPRINT)
+    routes = {name: plan(problem, name).waypoints for name in sorted(PLANNERS)}
+    figure, ax = new_figure(MAP_BOUNDS)
+    draw_grid(grid, bounds=MAP_BOUNDS, ax=ax)
+    ax.get_legend().remove()
+    draw_routes(routes, ax=ax)
+    save_figure(figure, ROOT / "docs" / "planners.png", dpi=80)
 
 
 def frame(ax: Axes, title: str) -> None:
