@@ -74,7 +74,8 @@ def draw_planners(grid: ConfidenceGrid) -> None:
     routes = {name: plan(problem, name).waypoints for name in sorted(PLANNERS)}
     figure, ax = new_figure(MAP_BOUNDS)
     draw_grid(grid, bounds=MAP_BOUNDS, ax=ax)
-    ax.get_legend().remove()
+    if (legend := ax.get_legend()) is not None:
+        legend.remove()  # the colours of the states are told apart in the picture above
     draw_routes(routes, ax=ax)
     save_figure(figure, ROOT / "docs" / "planners.png", dpi=80)
 
