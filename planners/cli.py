@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Sequence
+from importlib.metadata import version
+from typing import Annotated
 
 import typer
 from typer.exceptions import TyperException
@@ -26,11 +28,30 @@ DONE, BAD_INPUT, NO_ROUTE, INTERRUPTED = 0, 2, 3, 130
 
 app = typer.Typer(
     name="groundmap",
-    help="From sparse stereo features to a map one can plan on. Metres, radians, seconds.",
     add_completion=False,
     rich_markup_mode=None,  # it would take the units, such as [m], for markup
     pretty_exceptions_enable=False,
 )
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        print(f"groundmap {version('groundmap')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    _: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print the version."
+        ),
+    ] = False,
+) -> None:
+    """From sparse stereo features to a map one can plan on. Metres, radians, seconds."""
+
+
 app.command("demo")(demo_command)
 app.command("map")(map_command)
 app.command("plan")(plan_command)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -352,3 +353,8 @@ def assert_refused(ran: Ran, code: int, error: str | None, sentence: str) -> Non
     assert sentence in ran.json["reason"]
     assert ran.err == f"groundmap: {ran.json['reason']}\n"
     assert "\n" not in ran.json["reason"]
+
+
+def test_the_version_is_that_of_the_package() -> None:
+    ran = run("--version")
+    assert (ran.code, ran.out) == (0, f"groundmap {version('groundmap')}\n")
