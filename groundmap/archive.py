@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import IO, Any
@@ -92,19 +92,21 @@ def read_archive(
     return header, arrays
 
 
-def check_writable(path: str | PathLike[str], *, source: str | PathLike[str] | None = None) -> None:
+def check_writable(
+    path: str | PathLike[str], *, sources: Iterable[str | PathLike[str]] = ()
+) -> None:
     """Check that a file can be written there, before the work whose result it is to hold.
 
     Raises
     ------
     FileFormatError
-        The folder does not exist, the path is a folder, a device or the like, or it is the file
-        `source` that the work reads.
+        The folder does not exist, the path is a folder, a device or the like, or it is one of
+        the files `sources` that the work reads.
     """
     target = Path(path)
     if target.is_dir():
         raise FileFormatError(target, "a file name", "a folder")
-    if source is not None and target.resolve() == Path(source).resolve():
+    if target.resolve() in [Path(source).resolve() for source in sources]:
         raise FileFormatError(target, "another file than the one that is read", "the same")
     _check_regular(target)
     if not target.parent.is_dir():

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TypeAlias
+import math
+from numbers import Real
+from typing import TypeAlias, TypeGuard
 
 import numpy as np
 import numpy.typing as npt
@@ -47,6 +49,19 @@ def as_floats(name: str, values: npt.ArrayLike, shape: tuple[int | None, ...]) -
     if not fits:
         raise InputError(name, f"shape {_shown(shape)}", f"shape {array.shape}")
     return array
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether a value is a finite number, and not a truth value.
+
+    Examples
+    --------
+    >>> is_number(2), is_number(np.float32(0.5)), is_number(True), is_number("2"), is_number(np.nan)
+    (True, True, False, False, False)
+    """
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (Real, np.floating)):
+        return False
+    return math.isfinite(float(value))
 
 
 def check_finite(name: str, values: Floats, *, hint: str = "") -> None:

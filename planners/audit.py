@@ -120,7 +120,7 @@ def _check_yaw(name: str, asked: Sequence[float] | Floats, place: Floats, headin
         off = abs(math.remainder(heading - float(asked[2]), math.tau))
         if off > TOLERANCE:
             xy = (float(place[0]), float(place[1]))
-            raise AuditError(f"misses the yaw of the {name}", xy, got=off, needed=0.0)
+            raise AuditError(f"misses the yaw of the {name}", xy, got=off, needed=0.0, unit="rad")
 
 
 def _line(waypoints: Floats) -> shapely.Geometry:
@@ -196,5 +196,7 @@ def _check_swept(
         area, square = hits[:, 0]
         overlap = shapely.intersection(swept[area], shrunk[square])
         x, y = shapely.get_coordinates(shapely.point_on_surface(overlap))[0].tolist()
-        depth = float(np.sqrt(shapely.area(overlap)))
-        raise AuditError(f"sweeps a {names[square]} cell", (x, y), got=-depth, needed=0.0)
+        covered = float(shapely.area(overlap))
+        raise AuditError(
+            f"sweeps a {names[square]} cell", (x, y), got=covered, needed=0.0, unit="m²"
+        )

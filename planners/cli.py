@@ -22,9 +22,9 @@ from planners.commands.plan import plan_command
 from planners.commands.plot import plot_command
 from planners.commands.scenario import scenario_app
 from planners.console import say
-from planners.errors import NoRouteError, PlanningError
+from planners.errors import AuditError, NoRouteError, PlanningError
 
-DONE, BAD_INPUT, NO_ROUTE, INTERRUPTED = 0, 2, 3, 130
+DONE, MISSED, BAD_INPUT, NO_ROUTE, INTERRUPTED = 0, 1, 2, 3, 130
 
 app = typer.Typer(
     name="groundmap",
@@ -72,6 +72,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             say("groundmap: interrupted")
     except NoRouteError as error:
         code = _refuse(error, str(error), NO_ROUTE, argv)
+    except AuditError as error:
+        code = _refuse(error, f"{error} This is a bug: please report it.", MISSED, argv)
     except (GroundmapError, PlanningError, OSError) as error:
         code = _refuse(error, str(error), BAD_INPUT, argv)
     except TyperException as error:

@@ -13,7 +13,7 @@ from planners.errors import EnclosedError
 from planners.fields import reachable
 from planners.footprint import Footprint
 from planners.problem import PlanningProblem
-from planners.widest import WidestRoute, widest_way
+from planners.widest import LATTICE_SLACK, WidestRoute, widest_way
 from planners.wording import Place, Point, Turning
 
 
@@ -24,8 +24,8 @@ def enclosed(costmap: Costmap, *, needed: float | None = None) -> EnclosedError:
     ----------
     costmap : Costmap
     needed : float, optional [m]
-        Width that the footprint needs, of a planner that heeds its heading; unless told, that of
-        the disc that holds it however it is turned.
+        Width of the disc within the footprint, for planners that heed its heading; unless told,
+        that of the disc that holds it however it is turned.
     """
     problem, resolution = costmap.problem, costmap.window.resolution
     radius = costmap.radius if needed is None else needed / 2.0
@@ -44,6 +44,7 @@ def enclosed(costmap: Costmap, *, needed: float | None = None) -> EnclosedError:
         widest_gap=0.0 if widest is None else widest.width,
         bottleneck=None if widest is None else widest.bottleneck,
         needed=2.0 * radius,
+        slack=LATTICE_SLACK * resolution,
         turning=turning if needed is None else "heeded",
     )
 
@@ -51,7 +52,8 @@ def enclosed(costmap: Costmap, *, needed: float | None = None) -> EnclosedError:
 def widest_route(problem: PlanningProblem) -> WidestRoute:
     """Return the widest route from start to goal: what the widest robot would do.
 
-    The footprint does not matter, but for what is cleared around the start.
+    It leads along the half-cell lattice; a slanted way may be wider by up to 0.71 cells. The
+    footprint does not matter, but for what is cleared around the start.
 
     Parameters
     ----------

@@ -164,9 +164,11 @@ class EnclosedError(NoRouteError):
         Width of the footprint.
     bottleneck : tuple of float, optional [m, map]
         Where the widest way is narrowest; None if there is none.
+    slack : float, default 0 [m]
+        A way off the lattice may be wider by up to this.
     turning : {"none", "anyhow", "heeded"}
-        What `needed` is the width of: a disc, the disc that holds an outline however it is
-        turned, or the outline itself, whose heading the planner heeds.
+        What `needed` is the width of: a disc; the disc that holds an outline however it is
+        turned; the disc within an outline, of planners that heed headings.
 
     Examples
     --------
@@ -187,16 +189,20 @@ your footprint needs 0.60 m.
         widest_gap: float,
         needed: float,
         bottleneck: Point | None = None,
+        slack: float = 0.0,
         turning: Turning = "none",
     ) -> None:
         self.place, self.area, self.nearest, self.distance = place, area, nearest, distance
         self.widest_gap, self.needed, self.bottleneck = widest_gap, needed, bottleneck
-        self.turning = turning
-        what = f"area of {area:.1f} m²" if len(nearest) == 2 else f"space of {area:.1f} m³"
-        way = widest_clause(widest_gap, needed, bottleneck, turning)
-        if turning == "heeded" and widest_gap >= needed:  # nothing fences it in but its turns
-            super().__init__(f"no route that can be driven: {way}")
+        self.turning, self.slack = turning, slack
+        if turning == "heeded" and (widest_gap + slack >= needed or needed == 0):
+            super().__init__(
+                "no route that can be driven was found, looking at one pose for each cell and "
+                "heading: turn in smaller circles, leave it more room, or map with smaller cells."
+            )
             return
+        what = f"area of {area:.1f} m²" if len(nearest) == 2 else f"space of {area:.1f} m³"
+        way = widest_clause(widest_gap, needed, bottleneck, turning, slack=slack)
         super().__init__(
             f"no route: the {place} is fenced in: an enclosed {what} around it; the reachable "
             f"cell nearest to the goal is {shown(nearest)}, {distance:.2f} m away"
@@ -259,9 +265,11 @@ class AuditError(PlanningError):
     audit: the route comes too near to non-free space at (3.00, 1.50): expected 0.9 m, got 0.31 m.
     """
 
-    def __init__(self, fault: str, xy: Point, *, got: float, needed: float) -> None:
-        self.fault, self.xy, self.got, self.needed = fault, xy, got, needed
+    def __init__(
+        self, fault: str, xy: Point, *, got: float, needed: float, unit: str = "m"
+    ) -> None:
+        self.fault, self.xy, self.got, self.needed, self.unit = fault, xy, got, needed, unit
         super().__init__(
             f"audit: the route {fault} at ({xy[0]:.2f}, {xy[1]:.2f}): "
-            f"expected {needed:.9g} m, got {got:.9g} m."
+            f"expected {needed:.9g} {unit}, got {got:.9g} {unit}."
         )

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from groundmap.arrays import Bools, Floats, Ints
+from groundmap.arrays import Bools, Floats, Ints, is_number
 from planners.costmap import Costmap
 from planners.ends import ends_of
 from planners.engine import SLICE, Clock
@@ -102,7 +102,7 @@ def reachable(
     Raises
     ------
     ProblemError
-        A start that is not finite numbers, a problem without a costmap.
+        A start that is not finite numbers, a radius that is none, a problem without a costmap.
 
     Examples
     --------
@@ -115,6 +115,8 @@ def reachable(
     >>> int(reachable(problem, problem.start).sum()) == 30 * 64
     True
     """
+    if radius is not None and not (is_number(radius) and radius >= 0):
+        raise ProblemError("radius", "a radius of 0 or more [m]", repr(radius))
     costmap, xy = _costmap(space), _place("start", start)
     kept = costmap.radius if radius is None else radius
     same = kept == costmap.radius

@@ -60,6 +60,8 @@ points x, y [m, base_link] of a simple polygon, got one that meets itself at (0.
             Not numbers, not finite, a negative radius, fewer than 3 points, no area, or an
             outline that meets itself.
         """
+        if isinstance(value, (bool, str)):
+            raise _refusal(repr(value))
         try:
             array = np.asarray(value, dtype=np.float64)
         except (TypeError, ValueError) as error:

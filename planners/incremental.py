@@ -73,9 +73,18 @@ class IncrementalPlanner:
         changed : array_like of int, shape (n, 2)
             Cells [row, col] of the grid, such as `groundmap.GroundMapper.changed`;
             cells that the map did not have before among them.
+
+        Raises
+        ------
+        ProblemError
+            Something else than cells.
         """
+        cells = np.asarray(changed)
+        if cells.size and (cells.ndim != 2 or cells.shape[1] != 2 or cells.dtype.kind not in "iu"):
+            got = f"{cells.dtype} of shape {cells.shape}"
+            raise ProblemError("changed", "cells [row, col]: whole numbers of shape (n, 2)", got)
         if self._costmap is not None:
-            self._costmap = self._costmap.updated(changed)
+            self._costmap = self._costmap.updated(cells)
 
     def plan(
         self,
@@ -89,7 +98,8 @@ class IncrementalPlanner:
         start : sequence of float, optional
             Where the robot is now: x, y [m] and optionally yaw [rad]; where it was unless told.
         goal : sequence of float, optional
-            Another goal. The search then begins anew.
+            Another goal. The search then begins anew. It is kept
+            even if it is refused: the map may grow to it.
 
         Raises
         ------

@@ -86,9 +86,9 @@ def padded_window(problem: PlanningProblem) -> GridWindow:
     cells = float(np.prod((bounds[2:] - bounds[:2]) / grid.resolution))
     if cells > MOST_CELLS:
         raise ProblemError(
-            "footprint",
+            "footprint" if problem.cleared_at is None else "cleared_at",
             f"one that leaves {MOST_CELLS} cells of map and cleared start at most",
-            f"radius {problem.radius:g} m, which makes {cells:.3g}",
+            f"{problem.clear_radius:g} m around {problem.clear_place}, which makes {cells:.3g}",
             hint="Give a smaller footprint or clear_start_radius, or map with larger cells.",
         )
     return grid.window(bounds + ring)

@@ -9,7 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import Floats
+from groundmap.arrays import Floats, is_number
 from groundmap.grid import ConfidenceGrid
 from groundmap.window import EPSILON
 from planners.costs import CostSettings
@@ -42,10 +42,10 @@ class PlanningProblem:
     clear_start : bool, default True
         Whether *unknown* cells near the start count as free; non-free and contested ones never do.
     clear_start_radius : float [m], optional
-        Cells are near whose square comes within this distance of the start; twice the footprint's
-        radius unless told. (What a forward camera sees next to itself is a wedge narrower than
-        the footprint: with only the cells under the footprint cleared, the disc could never
-        leave.)
+        Cells are near whose square comes within this distance of the start. Unless told it is the
+        footprint's radius and half its width: of a disc, twice the radius. (What a forward camera
+        sees next to itself is a wedge narrower than the footprint: with only the cells under the
+        footprint cleared, the disc could never leave.)
     cleared_at : sequence of float, optional
         Where the cells are that clear_start clears, if not around the start: x, y (in 3-D:
         x, y, z) [m, map]. Of many problems on one map, each has them in the same place.
@@ -103,7 +103,9 @@ got (0, nan).
         if self.unknown not in get_args(Unknown):
             expected = "'avoid', 'allow' or 'penalise'"
             raise ProblemError("unknown", expected, repr(self.unknown))
-        if not 0 < self.epsilon < 1:
+        if not isinstance(self.clear_start, bool):
+            raise ProblemError("clear_start", "True or False", repr(self.clear_start))
+        if not (is_number(self.epsilon) and 0 < self.epsilon < 1):
             raise ProblemError("epsilon", "a number between 0 and 1", repr(self.epsilon))
 
     @property
@@ -148,13 +150,15 @@ got (0, nan).
     def clear_radius(self) -> float:
         """How near unknown cells come to the start that count as free [m]."""
         if self.clear_start_radius is None:
-            return 2.0 * self.radius
+            return self.radius + self.shape.width / 2.0
         return self.clear_start_radius
 
 
 def _pose(name: str, values: Sequence[float] | Floats, ndim: int) -> tuple[float, ...]:
     axes = "x, y" if ndim == 2 else "x, y, z"
     expected = f"{axes} [m] and optionally yaw [rad], all finite"
+    if not isinstance(values, (Sequence, np.ndarray)) or isinstance(values, str):
+        raise ProblemError(name, expected, repr(values))
     try:
         pose = tuple(float(value) for value in values)
     except (TypeError, ValueError) as error:
@@ -165,6 +169,6 @@ def _pose(name: str, values: Sequence[float] | Floats, ndim: int) -> tuple[float
 
 
 def _radius(name: str, value: float) -> float:
-    if not (np.isfinite(value) and value >= 0):
+    if not (is_number(value) and value >= 0):
         raise ProblemError(name, "a radius of 0 or more [m]", repr(value))
     return float(value)

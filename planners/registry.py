@@ -117,6 +117,6 @@ def named(planner: str) -> Planner:
     ProblemError
         There is none; the sentence names those there are.
     """
-    if planner not in PLANNERS:
+    if not isinstance(planner, str) or planner not in PLANNERS:
         raise ProblemError("planner", f"one of {', '.join(sorted(PLANNERS))}", repr(planner))
     return PLANNERS[planner]

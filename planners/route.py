@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
+import shapely
 import yaml
 
 from groundmap.archive import write_atomically
-from groundmap.arrays import Floats
+from groundmap.arrays import Bools, Floats
 from groundmap.errors import InputError
 from planners.engine import Found
 from planners.polyline import Crossed, crossed, distances_to, length_of
@@ -110,7 +111,7 @@ class Route:
             min_confidence=float(sureness.min()) + 0.0,  # + 0.0: an unknown cell's -0.0 is 0.0
             mean_confidence=_mean(sureness, line.lengths) + 0.0,
             unknown_length=float(line.lengths[unknown].sum()) * space.window.resolution,
-            start_unknown_area=_start_unknown_area(space, waypoints, line),
+            start_unknown_area=_start_unknown_area(space, found, line),
             planner=planner,
             expanded=found.expanded,
             seconds=seconds,
@@ -213,8 +214,15 @@ def _geojson(route: Route) -> str:
     return json.dumps(route.to_geojson(), indent=2) + "\n"
 
 
+class _PlainDumper(yaml.SafeDumper):
+    """Writes what comes twice twice, as not every reader knows YAML's references."""
+
+    def ignore_aliases(self, data: object) -> bool:
+        return True
+
+
 def _path_yaml(route: Route) -> str:
-    return yaml.safe_dump(route.to_path(), sort_keys=False)
+    return yaml.dump(route.to_path(), Dumper=_PlainDumper, sort_keys=False)
 
 
 WRITERS: dict[str, Callable[[Route], str]] = {
@@ -222,6 +230,7 @@ WRITERS: dict[str, Callable[[Route], str]] = {
     ".json": _geojson,
     ".csv": Route.to_csv,
     ".yaml": _path_yaml,
+    ".yml": _path_yaml,
 }
 
 
@@ -233,10 +242,12 @@ def _write(path: str | PathLike[str], text: str) -> None:
 
 
 def _headings(waypoints: Floats, problem: PlanningProblem) -> Floats:
-    """Return where a robot looks that drives along a line; standing, it looks along x."""
+    """Return where a robot looks that drives along a line; standing, as it was asked to."""
     dx, dy = np.diff(waypoints, axis=0).T[:2]
     headings = np.arctan2(dy, dx)
     ndim = problem.grid.ndim
+    if not (dx.any() or dy.any()) and len(problem.start) > ndim:
+        headings[:] = problem.start[ndim]
     last = problem.goal[ndim] if len(problem.goal) > ndim else headings[-1]
     return np.append(headings, last)
 
@@ -252,10 +263,25 @@ def _mean(values: Floats, weights: Floats) -> float:
     return float(np.average(values, weights=weights))
 
 
-def _start_unknown_area(space: Space, waypoints: Floats, line: Crossed) -> float:
+def _start_unknown_area(space: Space, found: Found, line: Crossed) -> float:
     centres = space.window.cell_to_world(np.argwhere(space.cleared))
     used = np.zeros_like(space.cleared)
-    used[space.cleared] = distances_to(centres, waypoints) <= space.radius
+    used[space.cleared] = _covered(space, found, centres)
     used[tuple(line.cells.T)] = True
     cells = float((used & space.cleared).sum())
     return cells * space.window.resolution**space.cleared.ndim
+
+
+def _covered(space: Space, found: Found, places: Floats) -> Bools:
+    """Return which places come under the footprint: the outline as it is turned, or the disc."""
+    polygon = space.problem.shape.polygon
+    if found.headings is None or polygon is None:
+        return distances_to(places, found.waypoints) <= space.radius
+    covered = np.zeros(len(places), dtype=np.bool_)
+    outline = shapely.Polygon(polygon)
+    shapely.prepare(outline)
+    for xy, yaw in zip(found.waypoints, found.headings.tolist(), strict=True):
+        x, y = (places - xy).T
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        covered |= shapely.intersects_xy(outline, cos * x + sin * y, cos * y - sin * x)
+    return covered

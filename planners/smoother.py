@@ -9,12 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from groundmap.arrays import Floats
+from groundmap.arrays import Floats, as_floats, check_finite, is_number
 from planners.answers import answer
 from planners.costmap import SLACK, Costmap
-from planners.engine import Found
+from planners.engine import Clock, Found
 from planners.errors import ProblemError, SmoothingError
 from planners.kernels.smooth import free_discs, relax
+from planners.polyline import length_of
 from planners.problem import PlanningProblem
 from planners.route import Route
 from planners.shortcuts import checked, cost_of, tightened
@@ -28,6 +29,7 @@ FIRST, TIGHTER, TIGHTEST = 1.03, 1.05, 1.1  # by how much smaller bends are aske
 WIDER = 0.05  # [cells] how much more clearance is asked for after a round that missed it, at most
 STRAIGHT = 1e-9  # [rad]
 TINY = 1e-12  # [m] of steps that are no longer, the length doesn't matter
+SMALLEST, LARGEST = 0.01, 1000.0  # [m] turning radius
 SHARES = (0.8, 0.6, 0.4, 0.2)  # of the turning radius, tried to say how much is possible
 
 
@@ -45,6 +47,7 @@ def smooth(
     *,
     turning_radius: float,
     spacing: float | None = None,
+    time_limit: float | None = 30.0,
 ) -> Route:
     """Return the route with its corners rounded, for a robot that can't turn on the spot.
 
@@ -61,10 +64,12 @@ def smooth(
     route : Route
         From any planner that does not decide on headings.
     turning_radius : float [m]
-        Least radius of the line's bends, more than 0.
+        Least radius of the line's bends, from 0.01 to 1000.
     spacing : float, optional [m]
         Distance of waypoints, about; half a cell or a quarter of the turning radius, whichever is
         less, unless told. Half the turning radius at most.
+    time_limit : float, optional [s]
+        Time for the bending; none: no limit.
 
     Returns
     -------
@@ -77,6 +82,8 @@ def smooth(
     ------
     SmoothingError
         The clearance is not enough for the turning radius, or no way was found to use it.
+    TimeLimitError
+        Time ran out.
     ProblemError
         See `planners.shortcut`; a turning radius or spacing out of range.
 
@@ -100,7 +107,7 @@ def smooth(
     if _is_straight(line, goals.yaws):
         found = Found(line, route.expanded)
     else:
-        line = _rounded(costmap, line, goals)
+        line = _rounded(costmap, line, goals, Clock("smooth", time_limit))
         found = Found(line, route.expanded, headings=_headings(line, goals.yaws))
     grown = cost_of(costmap, line) - cost_of(costmap, route.waypoints)
     cost = None if costmap.uniform else route.cost + grown
@@ -131,34 +138,38 @@ def max_curvature(waypoints: Floats) -> float:
     >>> max_curvature(np.array([[0.0, 0.0], [3.0, 0.0], [9.0, 0.0]]))
     0.0
     """
-    steps = np.diff(waypoints, axis=0)
+    line = as_floats("waypoints", waypoints, (None, 2))
+    check_finite("waypoints", line)
+    steps = np.diff(line, axis=0)
     curvatures = _curvatures(steps[np.hypot(*steps.T) > 0.0])
     return float(curvatures.max(initial=0.0))
 
 
 def _goals(costmap: Costmap, route: Route, turning_radius: float, spacing: float | None) -> _Goals:
-    if not (math.isfinite(turning_radius) and turning_radius > 0):
-        raise ProblemError("turning_radius", "a radius above 0 [m]", repr(turning_radius))
+    if not (is_number(turning_radius) and SMALLEST <= turning_radius <= LARGEST):
+        expected = f"a radius from {SMALLEST:g} to {LARGEST:g} [m]"
+        raise ProblemError("turning_radius", expected, repr(turning_radius))
     if spacing is None:
         spacing = min(costmap.window.resolution / 2.0, turning_radius / 4.0)
-    elif not 0 < spacing <= turning_radius / 2.0:
+    elif not (is_number(spacing) and 0 < spacing <= turning_radius / 2.0):
         expected = f"above 0 and at most {turning_radius / 2.0:g} m, half the turning radius"
         raise ProblemError("spacing", expected, repr(spacing))
     if route.length / spacing > MOST:
-        expected = f"one that makes {MOST} waypoints at most"
-        raise ProblemError("spacing", expected, f"{spacing:g} m on {route.length:.2f} m")
+        expected = f"one that makes {MOST} waypoints at most, {route.length / MOST:g} m"
+        hint = "It is a quarter of the turning radius unless told."
+        raise ProblemError("spacing", expected, f"{spacing:g} m", hint=hint)
     yaws = _yaw(costmap.problem.start), _yaw(costmap.problem.goal)
     return _Goals(turning_radius, spacing, yaws)
 
 
-def _rounded(costmap: Costmap, line: Floats, goals: _Goals) -> Floats:
+def _rounded(costmap: Costmap, line: Floats, goals: _Goals, clock: Clock) -> Floats:
     """Return the line with its corners rounded.
 
     Raises
     ------
     SmoothingError
     """
-    bent, good = _bent(costmap, line, goals)
+    bent, good = _bent(costmap, line, goals, clock)
     if good:
         return bent
     place = _worst_place(costmap, bent, goals.turning_radius)
@@ -166,14 +177,14 @@ def _rounded(costmap: Costmap, line: Floats, goals: _Goals) -> Floats:
     for share in SHARES:
         radius = share * goals.turning_radius
         less = goals._replace(turning_radius=radius, spacing=min(goals.spacing, radius / 2.0))
-        tried, good = _bent(costmap, line, less)
+        tried, good = _bent(costmap, line, less, clock)
         if good:
             possible = min(1.0 / max_curvature(tried), goals.turning_radius)
             break
     raise SmoothingError(place, turning_radius=goals.turning_radius, possible=possible)
 
 
-def _bent(costmap: Costmap, line: Floats, goals: _Goals) -> tuple[Floats, bool]:
+def _bent(costmap: Costmap, line: Floats, goals: _Goals, clock: Clock) -> tuple[Floats, bool]:
     """Return the line, bent, and whether it keeps what it is to keep.
 
     A round finds the discs around the points, and relaxes the line in them. It ends near its
@@ -185,10 +196,12 @@ def _bent(costmap: Costmap, line: Floats, goals: _Goals) -> tuple[Floats, bool]:
     strictness = FIRST
     # Between two points that keep a distance, their chord may come nearer to a corner.
     margin = math.hypot(costmap.radius, goals.spacing / 2.0) - costmap.radius
+    longest = length_of(line)  # farther from the line than that, nothing helps
     for k in range(ROUNDS):
+        clock.check(k)
         line, step = _spaced(line, goals)
         cells = costmap.to_cells(line)
-        reach = REACH[k % len(REACH)] * radius
+        reach = min(REACH[k % len(REACH)] * radius, longest)
         discs = free_discs(costmap.blocked, cells, (costmap.radius + margin) / size, reach / size)
         discs = _on_map(costmap, discs)
         bend = step * step / (radius * strictness * size)

@@ -51,6 +51,6 @@ def solve(
     if found is None:
         if isinstance(space, Voxels):
             raise enclosed_3d(space)
-        raise enclosed(space, needed=problem.shape.width if headings else None)
+        raise enclosed(space, needed=2.0 * problem.shape.inscribed_radius if headings else None)
     seconds = time.perf_counter() - began
     return answer(space, found, planner=engine.name, seconds=seconds, audited=audited)

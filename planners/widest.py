@@ -22,11 +22,17 @@ from planners.wording import Place, Point
 
 # What steps cost of which no, one, or both ends are at the narrowest: both count twice.
 STEPS = np.rint(np.array([[astar.ONE], [astar.DIAGONAL]]) * [1.0, 1.5, 2.0]).astype(np.int64)
+# [cells] Every place has a lattice point within a quarter of a cell along x and along y, and a line
+# leads past such points: no way is wider by more than twice that distance.
+LATTICE_SLACK = math.sqrt(0.5)
 FIRST_ROOM = 1 << 14  # heap entries to begin with
 
 
 class WidestRoute(NamedTuple):
-    """The widest way between two places."""
+    """The widest way between two places, along the half-cell lattice.
+
+    A slanted way off the lattice may be wider, by up to 0.71 cells.
+    """
 
     waypoints: Floats  #: shape (n, 2) [m, map]: start, turning points, goal
     width: float  #: of the widest disc that can follow it [m]; infinite if nothing is blocked

@@ -11,21 +11,26 @@ Point: TypeAlias = tuple[float, ...]  #: x, y (on a 3-D map also z) [m, map]
 MOST_DECIMALS = 9  # of a width [m]: what is nearer is the same, up to rounding
 
 
-def widest_clause(widest: float, needed: float, at: Point | None, turning: Turning) -> str:
+def widest_clause(
+    widest: float, needed: float, at: Point | None, turning: Turning, *, slack: float
+) -> str:
     """Return how wide the widest way is and what that means; nothing if it was not measured."""
     if math.isnan(widest):
         return ""
     if widest == 0:
         return "no way from start to goal exists, however narrow the footprint."
     has, needs = _apart(widest, needed)
-    way = f"the widest way is {has} m wide{'' if at is None else f' at {shown(at)}'}"
+    # The width is that along a lattice: near what is needed, a slanted way may be wide enough.
+    about = "about " if widest < needed <= widest + slack else ""
+    way = f"the widest way is {about}{has} m wide{'' if at is None else f' at {shown(at)}'}"
     footprint = "your footprint, turned anyhow," if turning == "anyhow" else "your footprint"
+    at_least = " at least" if turning == "heeded" else ""
     if widest < needed:
-        return f"{way}, {footprint} needs {needs} m."
-    enough = f"{way}, enough for what {footprint} needs, {needs} m, but"
-    if turning == "heeded":
-        return f"{enough} not for its turns. Turn in smaller circles, or leave it more room."
-    return f"{enough} not along cell centres: map with smaller cells."
+        return f"{way}, {footprint} needs {needs} m{at_least}."
+    return (
+        f"{way}, enough for what {footprint} needs, {needs} m, but not along cell centres: "
+        "map with smaller cells, or plan with 'hybrid_astar'."
+    )
 
 
 def _apart(a: float, b: float) -> tuple[str, str]:

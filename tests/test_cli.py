@@ -193,7 +193,10 @@ def test_plan_says_why_there_is_no_route(
         (("--set", "weight"), "expected NAME=VALUE, each name once, got 'weight'"),
         (("--set", "weight=3"), "weight: expected a setting of AStarSettings"),
         (("--clearance-weight", "-1"), "clearance_weight: expected greater than or equal to 0"),
-        (("--planner", "all", "--set", "weight=3"), "--out and --set are for one planner, not all"),
+        (
+            ("--planner", "all", "--set", "weight=3"),
+            "--out, --set, --shortcut and --smooth don't go with all",
+        ),
     ],
 )
 def test_plan_refuses_bad_options(square: Path, options: tuple[str, ...], sentence: str) -> None:
@@ -321,7 +324,7 @@ def test_without_arguments_it_prints_help() -> None:
     [
         ("demo", ()),
         ("map", ("cell [m]", "features [m]", "ground [m]")),
-        ("plan", ("Start [m, rad; map]", "Goal [m, rad; map]", "robot [m]", "after [s]")),
+        ("plan", ("Start [m, rad; map]", "Goal, likewise", "robot [m]", "after [s]")),
         ("plot", ("draw [m]", "route [m]")),
         ("info", ("areas [m²]", "bounds [m]")),
         ("convert", ()),

@@ -165,3 +165,37 @@ def test_what_takes_long_is_spoken_of(capsys: pytest.CaptureFixture[str]) -> Non
     with patiently("counting cows", every=60.0):
         pass
     assert capsys.readouterr().err == ""
+
+
+def test_nothing_is_written_over_what_the_map_is_made_of(tmp_path: Path) -> None:
+    image = tmp_path / "hall.png"
+    Image.fromarray(np.full((40, 60), 254, dtype=np.uint8)).save(image)
+    (tmp_path / "hall.yaml").write_text(
+        "image: hall.png\nresolution: 0.1\norigin: [-1.0, -2.0, 0.0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    before = image.read_bytes()
+    for options in (("--plot", image), ("--out", tmp_path / "hall.yaml")):
+        ran = plan(tmp_path / "hall.yaml", *options, start="0,0", goal="4,1", footprint="0.3")
+        assert ran.code == 2
+        assert "expected another file than the one that is read" in ran.json["reason"]
+    assert run("plot", tmp_path / "hall.yaml", "--out", image).code == 2
+    assert image.read_bytes() == before
+
+
+def test_a_setting_may_be_the_time_limit(wall: Path) -> None:
+    assert plan(wall, "--set", "time_limit=none").code == 0
+    ran = plan(wall, "--set", "time_limit=0")
+    assert (ran.code, ran.json["error"]) == (3, "TimeLimitError")
+
+
+def test_an_inflation_radius_without_a_weight_is_refused(wall: Path) -> None:
+    ran = plan(wall, "--inflation-radius", "2")
+    assert ran.code == 2
+    assert "--inflation-radius needs a --clearance-weight" in ran.json["reason"]
+
+
+def test_a_ros_path_has_no_references(wall: Path, tmp_path: Path) -> None:
+    out = tmp_path / "path.yml"
+    assert plan(wall, "--out", out).code == 0
+    assert "&id" not in out.read_text()

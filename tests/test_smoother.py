@@ -354,7 +354,7 @@ def test_relaxing_ends_at_the_optimum() -> None:
 @pytest.mark.parametrize("turning_radius", [0.0, -1.0, math.nan, math.inf])
 def test_a_turning_radius_that_is_none_is_refused(turning_radius: float) -> None:
     problem = PlanningProblem(grid_of(free_field(64, 64)), start=(5, 5), goal=(9, 9), footprint=1)
-    with pytest.raises(ProblemError, match="turning_radius: expected a radius above 0"):
+    with pytest.raises(ProblemError, match="turning_radius: expected a radius from 0.01 to 1000"):
         smooth(problem, plan(problem), turning_radius=turning_radius)
 
 
@@ -374,3 +374,18 @@ def test_a_smoothed_route_is_not_smoothed_again() -> None:
     rounded = smooth(problem, plan(problem), turning_radius=8.0)
     with pytest.raises(ProblemError, match=r"headings were decided on \(astar\)"):
         smooth(problem, rounded, turning_radius=4.0)
+
+
+def test_a_turning_radius_of_a_kilometre_ends_in_time() -> None:
+    z = free_field(64, 64)
+    z[:40, 30] = BLOCKED
+    problem = PlanningProblem(grid_of(z), start=(10, 10), goal=(50, 10), footprint=1.0)
+    with pytest.raises(SmoothingError, match=r"with a turning radius of 1000.00 m"):
+        smooth(problem, plan(problem), turning_radius=1000.0, time_limit=None)
+    with pytest.raises(TimeLimitError, match="smooth: no route within time_limit = 0 s"):
+        smooth(problem, plan(problem), turning_radius=2.0, time_limit=0.0)
+
+
+def test_the_curvature_of_what_is_no_line_is_refused() -> None:
+    with pytest.raises(InputError, match=r"waypoints: expected finite numbers, got nan"):
+        max_curvature(np.array([(0.0, 0.0), (math.nan, 1.0), (2.0, 2.0)]))

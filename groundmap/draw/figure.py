@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -78,7 +79,9 @@ def figure_png(figure: Figure, dpi: int = 110) -> bytes:
     return stream.getvalue()
 
 
-def check_picture(path: str | PathLike[str]) -> None:
+def check_picture(
+    path: str | PathLike[str], *, sources: Iterable[str | PathLike[str]] = ()
+) -> None:
     """Check that a picture can be written there, before the work that it is to show.
 
     Raises
@@ -86,11 +89,12 @@ def check_picture(path: str | PathLike[str]) -> None:
     InputError
         Another suffix than .png, .pdf or .svg.
     FileFormatError
-        The folder does not exist, or the path is a folder itself.
+        The folder does not exist, or the path is a folder itself, or one of the files `sources`
+        that the work reads.
     """
     if Path(path).suffix.lower() not in PICTURE_FORMATS:
         raise InputError("plot", f"a file name ending in {', '.join(PICTURE_FORMATS)}", str(path))
-    check_writable(path)
+    check_writable(path, sources=sources)
 
 
 def scale_bar(ax: Axes) -> list[Artist]:

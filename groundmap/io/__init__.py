@@ -3,7 +3,7 @@
 from groundmap.io.export import EXPORTERS, export
 from groundmap.io.folder_writer import write_views
 from groundmap.io.formats import FORMATS, read_views
-from groundmap.io.load import LOADERS, load_map
+from groundmap.io.load import LOADERS, files_of, load_map
 from groundmap.io.log import ViewLog
 from groundmap.io.map_images import grid_of
 
@@ -13,6 +13,7 @@ __all__ = [
     "LOADERS",
     "ViewLog",
     "export",
+    "files_of",
     "grid_of",
     "load_map",
     "read_views",

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from groundmap.errors import InputError
 from groundmap.grid import ConfidenceGrid
-from groundmap.io.map_images import grid_of, read_ros_map
+from groundmap.io.map_images import grid_of, image_of, read_ros_map
 from groundmap.io.movingai import read_movingai_map, read_movingai_voxels
 
 IMAGES = {".bmp", ".gif", ".jpeg", ".jpg", ".pgm", ".png", ".tif", ".tiff"}
@@ -49,3 +49,15 @@ names it, with its resolution, origin and thresholds.
         hint = "Give the .yaml that names it, with its resolution, origin and thresholds."
         raise InputError(str(path), "a map", "an image", hint=hint)
     return LOADERS.get(suffix, ConfidenceGrid.load)(path)
+
+
+def files_of(path: str | PathLike[str]) -> list[Path]:
+    """Return the files that `load_map` reads: the map's, and the image that a ``.yaml`` names.
+
+    Raises
+    ------
+    FileFormatError
+        A ``.yaml`` that is missing, or names no image.
+    """
+    path = Path(path)
+    return [path, image_of(path)] if path.suffix.lower() == ".yaml" else [path]

@@ -94,6 +94,20 @@ def read_ros_map(path: str | PathLike[str]) -> BlockedMap:
     return BlockedMap(blocked, ~blocked & (darkness >= free), resolution, origin)
 
 
+def image_of(path: Path) -> Path:
+    """Return the image that a map of map_server names.
+
+    Raises
+    ------
+    FileFormatError
+        A file that is missing or can't be read, or names no image.
+    """
+    name = _read_yaml(path)["image"]
+    if not isinstance(name, str):
+        raise FileFormatError(path, "the name of an image", repr(name))
+    return path.parent / name
+
+
 def _read_yaml(path: Path) -> dict[str, Any]:
     with opened(path) as stream:
         try:

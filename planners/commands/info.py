@@ -14,13 +14,14 @@ from planners.console import JsonOption, emit
 
 def info_command(
     map_file: Annotated[
-        Path, typer.Argument(metavar="MAP", help="A map that `map` wrote, or one for map_server.")
+        Path, typer.Argument(metavar="MAP", help="A map: .npz, .yaml (map_server), .map, .3dmap.")
     ],
     as_json: JsonOption = False,
 ) -> None:
     """Tell what a map file holds: areas [m²], bounds [m], rule, poses."""
     grid = load_map(map_file)
     poses = grid.trajectory
+    extent, unit = ("area", "m2") if grid.ndim == 2 else ("volume", "m3")
     result = {
         "resolution": grid.resolution,
         "frame": grid.frame,
@@ -28,9 +29,9 @@ def info_command(
         "bounds": grid.bounds().tolist(),
         "tiles": sum(1 for _ in grid.tiles()),
         "map_bytes": grid.nbytes,
-        "area_free_m2": grid.area(CellState.FREE),
-        "area_nonfree_m2": grid.area(CellState.NONFREE),
-        "area_contested_m2": grid.area(CellState.CONTESTED),
+        f"{extent}_free_{unit}": grid.area(CellState.FREE),
+        f"{extent}_nonfree_{unit}": grid.area(CellState.NONFREE),
+        f"{extent}_contested_{unit}": grid.area(CellState.CONTESTED),
         "poses": len(poses),
         "first_pose": poses[0].tolist() if len(poses) else None,
         "last_pose": poses[-1].tolist() if len(poses) else None,

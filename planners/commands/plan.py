@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, cast
 
+import numpy as np
 import typer
 
 from groundmap.archive import check_writable
 from groundmap.draw import check_picture
-from groundmap.io import load_map
+from groundmap.io import files_of, load_map
+from groundmap.io.map_images import BlockedMap, grid_of
 from planners.commands.options import assignments, outline
 from planners.commands.plot import check_flat, draw_map
 from planners.console import JsonOption, emit, emit_rows, numbers, patiently, watched
@@ -25,14 +27,24 @@ ALL = "all"  # instead of a planner's name
 COLUMNS = ("length", "cost", "bound", "min_clearance", "mean_clearance", "min_confidence",
            "mean_confidence", "expanded", "seconds")  # fmt: skip
 PLAIN = CostSettings()
+SETTINGS = "; ".join(
+    f"{name}: {', '.join(own)}"
+    for name, entry in sorted(PLANNERS.items())
+    if (own := [key for key in entry.settings.model_fields if key != "time_limit"])
+)
 
 
 def plan_command(
     map_file: Annotated[
-        Path, typer.Argument(metavar="MAP", help="A map that `map` wrote, or one for map_server.")
+        Path, typer.Argument(metavar="MAP", help="A map: .npz, .yaml (map_server), .map, .3dmap.")
     ],
-    start: Annotated[str, typer.Option(metavar="X,Y[,YAW]", help="Start [m, rad; map].")],
-    goal: Annotated[str, typer.Option(metavar="X,Y[,YAW]", help="Goal [m, rad; map].")],
+    start: Annotated[
+        str, typer.Option(metavar="X,Y[,YAW]", help="Start [m, rad; map]; X,Y,Z on a 3-D map.")
+    ],
+    goal: Annotated[
+        str,
+        typer.Option(metavar="X,Y[,YAW]", help="Goal, likewise; hybrid_astar needs both yaws."),
+    ],
     footprint: Annotated[
         str,
         typer.Option(
@@ -54,7 +66,8 @@ def plan_command(
         str, typer.Option(help="Unknown and contested space: avoid, allow or penalise.")
     ] = "avoid",
     clear_start: Annotated[
-        bool, typer.Option(help="Count unknown cells near the start as free.")
+        bool,
+        typer.Option(help="Count unknown cells within twice the footprint's radius as free."),
     ] = True,
     clearance_weight: Annotated[
         float, typer.Option(help="Extra cost of a metre that just clears obstacles [m/m].")
@@ -71,23 +84,27 @@ def plan_command(
     time_limit: Annotated[float, typer.Option(help="Give up after [s].")] = 30.0,
     settings: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="A setting of the planner."),
+        typer.Option("--set", metavar="NAME=VALUE", help=f"A setting of the planner: {SETTINGS}."),
     ] = None,
     straighten: Annotated[bool, typer.Option("--shortcut", help="Pull the route tight.")] = False,
     turning_radius: Annotated[
         float | None,
-        typer.Option("--smooth", help="Pull it tight and turn with at least this radius [m]."),
+        typer.Option(
+            "--smooth", metavar="R", help="Pull it tight and turn with at least this radius [m]."
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Plan a collision-free route on a map."""
     if out is not None:
         check_route_file(out)
-        check_writable(out, source=map_file)
+        check_writable(out, sources=files_of(map_file))
     if plot is not None:
-        check_picture(plot)
-    if planner == ALL and (out is not None or settings):
-        raise typer.BadParameter(f"--out and --set are for one planner, not {ALL}")
+        check_picture(plot, sources=files_of(map_file))
+    if planner == ALL and (out or settings or straighten or turning_radius is not None):
+        raise typer.BadParameter(f"--out, --set, --shortcut and --smooth don't go with {ALL}")
+    if inflation_radius != PLAIN.inflation_radius and clearance_weight == 0:
+        raise typer.BadParameter("--inflation-radius needs a --clearance-weight above 0")
     grid = load_map(map_file)
     if plot is not None:
         check_flat(grid, map_file)
@@ -109,7 +126,8 @@ def plan_command(
         _compare(problem, plot, time_limit, as_json=as_json, title=f"routes on {map_file}")
         return
     with patiently("planning; what was never used before is compiled now"):
-        route = plan(problem, planner, time_limit=time_limit, **assignments(settings or []))
+        chosen = {"time_limit": time_limit, **assignments(settings or [])}
+        route = plan(problem, planner, **chosen)
         if turning_radius is not None:
             route = smooth(problem, route, turning_radius=turning_radius)
         elif straighten:
@@ -136,6 +154,7 @@ def _compare(
     failures: list[NoRouteError] = []
     names = sorted(PLANNERS)
     for name in watched(names, total=len(names), what="planners"):
+        _warm_up(name)  # the table's seconds are those of planning, not of compiling
         try:
             routes[name] = plan(problem, name, time_limit=time_limit)
         except NoRouteError as error:
@@ -156,3 +175,9 @@ def _compare(
     emit_rows(rows, title=title)
     for name, reason in refused.items():
         print(f"{name}: {reason}")
+
+
+def _warm_up(planner: str) -> None:
+    """Have all compiled, or loaded, that a planner needs."""
+    field = grid_of(BlockedMap(np.zeros((9, 9), bool), np.zeros((9, 9), bool), 1.0, (0.0, 0.0)))
+    plan(PlanningProblem(field, start=(2, 2, 0), goal=(7, 5, 0), footprint=0.5), planner)

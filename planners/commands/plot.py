@@ -15,7 +15,7 @@ import typer
 from groundmap import ConfidenceGrid, GroundMapper, draw, fit_ground, read_views
 from groundmap.arrays import Floats, as_floats
 from groundmap.errors import FileFormatError, InputError
-from groundmap.io import load_map
+from groundmap.io import files_of, load_map
 from planners.commands.settings_file import ConfigOption, read_settings
 from planners.console import JsonOption, emit, numbers
 
@@ -47,7 +47,7 @@ def plot_command(
 ) -> None:
     """Draw a map: free, non-free, contested and unknown space, and where it was seen from."""
     picture = out or _beside(map_file)
-    draw.check_picture(picture)
+    draw.check_picture(picture, sources=files_of(map_file))
     if explain is not None:
         _draw_view(map_file, explain, camera_height, read_settings(config), picture)
         emit({"out": str(picture)}, as_json=as_json, title=f"view {explain} of {map_file}")
