@@ -123,10 +123,12 @@ def nearest_place(space: Space, xy: Point, *, yaw: float | None = None) -> Point
     """
     open_cells = space.stand if yaw is None else ~space.blocked
     centres: Floats = space.window.cell_to_world(np.argwhere(open_cells))
-    order = np.argsort(np.hypot.reduce(centres - xy, axis=1), kind="stable")
-    for index in order:
+    away = np.hypot.reduce(centres - xy, axis=1)
+    if yaw is None:
+        return tuple(centres[away.argmin()].tolist()) if len(away) else None
+    for index in np.argsort(away, kind="stable"):
         centre: Point = tuple(centres[index].tolist())
-        if yaw is None or _fits(space, space.blocked, centre, yaw):
+        if _fits(space, space.blocked, centre, yaw):
             return centre
     return None
 
@@ -142,7 +144,10 @@ def _fits(space: Space, blocked: Bools, xy: Point, yaw: float | None) -> bool:
     position = space.to_cells(xy)[0]
     if yaw is None or polygon is None:
         cell = tuple(np.floor(position).astype(np.int64)[::-1])
-        return not blocked[cell] and space.clearance_of(xy, to=blocked) >= space.radius - SLACK
+        return (
+            not blocked[cell]
+            and space.clearance_of(xy, to=blocked, limit=space.radius) >= space.radius - SLACK
+        )
     x, y = position.tolist()
     corners = polygon / space.window.resolution
     return bool(pose_clear(blocked, corners, x, y, math.cos(yaw), math.sin(yaw)))

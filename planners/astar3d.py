@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from groundmap.arrays import Floats, Ints
+from planners.costmap import SLACK
 from planners.engine import SLICE, Clock, Found, Pose, SearchSettings
 from planners.kernels.astar import EXHAUSTED, FAR, FOUND, HEAP_FULL, ONE
 from planners.kernels.astar3d import (
@@ -28,7 +29,6 @@ from planners.polyline import SAME, length_of
 from planners.voxels import Voxels
 
 FIRST_ROOM = 1 << 14  # heap entries to begin with
-SLACK = 5e-10  # [m] shortfall of clearance that is put down to the rounding of coordinates
 
 
 class AStar3D:

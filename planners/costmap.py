@@ -12,6 +12,7 @@ import numpy.typing as npt
 from groundmap.arrays import Bools, Bytes, Floats, Ints, Ints32
 from groundmap.window import GridWindow
 from planners.costs import MAX_NON_OBSTACLE
+from planners.errors import ProblemError
 from planners.kernels.astar import DIAGONAL, ONE
 from planners.kernels.clearance import line_clearance
 from planners.kernels.distance import NOWHERE, squared_distances
@@ -78,13 +79,20 @@ class Costmap:
         changed : array_like of int, shape (n, 2)
             Cells [row, col] of the grid whose confidence, count or drop-offs changed. Where the
             map has grown since, everything is worked out.
+
+        Raises
+        ------
+        ProblemError
+            Cells of another shape, or not of whole numbers.
         """
-        cells = np.asarray(changed, dtype=np.int64).reshape(-1, 2) - self.lower_cell
+        cells = whole_cells(changed) - self.lower_cell
         if len(cells) == 0:
             return self
         shape = np.array(self.blocked.shape)
         # The ring of a cell and a half around the map: what grew touches it, or lies beyond.
-        if (cells < 1).any() or (cells >= shape - 1).any():
+        tiles = np.array(self.problem.grid.cell_bounds()) - self.lower_cell
+        reached = np.concatenate([cells, tiles - [[0], [1]]])
+        if (reached < 1).any() or (reached >= shape - 1).any():
             return Costmap.of(self.problem)
         reach = math.isqrt(cap(self.problem)) // 2 + 2
         first = np.maximum(cells.min(axis=0) - reach, 0)
@@ -177,7 +185,9 @@ class Costmap:
         shifted: Floats = np.atleast_2d(np.asarray(points, dtype=np.float64)) - self.window.origin
         return shifted / self.window.resolution
 
-    def clearance_of(self, points: npt.ArrayLike, *, to: Bools | None = None) -> float:
+    def clearance_of(
+        self, points: npt.ArrayLike, *, to: Bools | None = None, limit: float = math.inf
+    ) -> float:
         """Return the exact distance of a point or a polyline to the nearest blocked square [m].
 
         Parameters
@@ -185,9 +195,28 @@ class Costmap:
         points : array_like, shape (2,) or (n, 2) [m, map]
         to : ndarray of bool, shape (rows, cols), optional
             Other cells than the blocked ones.
+        limit : float, default inf [m]
+            Nothing farther away is looked for.
         """
-        mask = self.blocked if to is None else to
-        return line_clearance(mask, self.to_cells(points)) * self.window.resolution
+        mask, size = self.blocked if to is None else to, self.window.resolution
+        return line_clearance(mask, self.to_cells(points), limit / size) * size
+
+
+def whole_cells(changed: npt.ArrayLike) -> Ints:
+    """Return cells [row, col], shape (n, 2).
+
+    Raises
+    ------
+    ProblemError
+        Another shape, or not whole numbers.
+    """
+    cells = np.asarray(changed)
+    if cells.size == 0:
+        return np.empty((0, 2), dtype=np.int64)
+    if cells.ndim != 2 or cells.shape[1] != 2 or cells.dtype.kind not in "iu":
+        got = f"shape {cells.shape} of {cells.dtype}"
+        raise ProblemError("changed", "whole numbers [row, col], shape (n, 2)", got)
+    return cells.astype(np.int64)
 
 
 def _slices(first: Ints, last: Ints) -> tuple[slice, slice]:

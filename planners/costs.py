@@ -10,6 +10,7 @@ from groundmap.settings import Settings
 
 FREE_SPACE, MAX_NON_OBSTACLE = 0, 252  # Nav2's scale: in between, the dearer the higher
 INSCRIBED_INFLATED_OBSTACLE, LETHAL_OBSTACLE, NO_INFORMATION = 253, 254, 255
+ROUNDING = 1e-12  # relative error granted to distances that are cut to the inflation radius
 
 
 class CostSettings(Settings):
@@ -87,7 +88,7 @@ def cell_costs(
     if top == 0:
         return np.zeros(clearance.shape, dtype=np.uint8)
     near = np.exp(-settings.cost_scaling_factor * np.maximum(clearance - radius, 0.0))
-    near[clearance >= settings.inflation_radius] = 0.0
+    near[clearance >= settings.inflation_radius * (1.0 - ROUNDING)] = 0.0
     doubt = settings.confidence_weight * (1.0 + np.clip(confidence.astype(np.float64), -1.0, 0.0))
     if penalise:
         doubt[~known] = settings.unknown_weight

@@ -19,7 +19,7 @@ class Ends(NamedTuple):
 
     sources: Ints  #: shape (n, 3): row, column, cost from the start
     targets: Ints  #: shape (m, 3): row, column, cost to the goal
-    direct: bool  #: start and goal lie within two by two cells and nothing is between them
+    direct: bool  #: the straight piece from start to goal, within two by two cells, is the best
 
 
 def ends_of(costmap: Costmap, start: tuple[float, ...], goal: tuple[float, ...]) -> Ends:
@@ -36,7 +36,8 @@ def ends_of(costmap: Costmap, start: tuple[float, ...], goal: tuple[float, ...])
     return Ends(
         _with_costs(costmap, links(costmap, (start[0], start[1]), radius=radius)),
         _with_costs(costmap, links(costmap, (goal[0], goal[1]), radius=radius)),
-        costmap.uniform and is_clear(costmap, (ax, ay), (bx, by), radius=radius),
+        (costmap.uniform or start[:2] == goal[:2])
+        and is_clear(costmap, (ax, ay), (bx, by), radius=radius),
     )
 
 

@@ -12,9 +12,10 @@ import numpy.typing as npt
 
 from groundmap.arrays import Floats, Ints
 from planners.answers import check_on_map
-from planners.costmap import Costmap
+from planners.costmap import Costmap, whole_cells
 from planners.dstar_lite import DStarLite, DStarLiteSettings
 from planners.errors import ProblemError
+from planners.layers import EDGE, padded_bounds
 from planners.problem import PlanningProblem
 from planners.route import Route
 from planners.solve import solve
@@ -79,10 +80,7 @@ class IncrementalPlanner:
         ProblemError
             Something else than cells.
         """
-        cells = np.asarray(changed)
-        if cells.size and (cells.ndim != 2 or cells.shape[1] != 2 or cells.dtype.kind not in "iu"):
-            got = f"{cells.dtype} of shape {cells.shape}"
-            raise ProblemError("changed", "cells [row, col]: whole numbers of shape (n, 2)", got)
+        cells = whole_cells(changed)
         if self._costmap is not None:
             self._costmap = self._costmap.updated(cells)
 
@@ -140,6 +138,9 @@ class IncrementalPlanner:
         here = replace(before, problem=self.problem)
         if _ends(before.problem) == _ends(self.problem):
             return here
+        now, then = padded_bounds(self.problem), padded_bounds(before.problem)
+        if not self.problem.avoids_unknown and (now != then).any():
+            return Costmap.of(self.problem)  # what lies around the map may be driven on, too
         cells = np.concatenate([_unknown_cells(before), _unknown_cells(here)])
         return here.updated(cells + before.lower_cell)
 
@@ -149,13 +150,15 @@ def _ends(problem: PlanningProblem) -> tuple[Point, Point]:
 
 
 def _unknown_cells(costmap: Costmap) -> Ints:
-    """Return cells near the start, and that of the goal, if unknown or beyond the window."""
+    """Return cells near what is cleared, and the ends', if unknown or beyond the window."""
     problem, window = costmap.problem, costmap.window
-    reach = problem.clear_radius if problem.clear_start else 0.0
+    # A little more than the radius: squares that only touch it are cleared, too.
+    reach = problem.clear_radius + 2.0 * EDGE if problem.clear_start else 0.0
     corners = [np.array(problem.clear_place) - reach, np.array(problem.clear_place) + reach]
     first, last = window.world_to_cell(corners)
     around = np.argwhere(np.ones(last - first + 1)) + first
-    cells = np.concatenate([around, window.world_to_cell(problem.goal_xy)])
+    ends = window.world_to_cell([problem.start_xy, problem.goal_xy])
+    cells = np.concatenate([around, ends])
     inside = window.contains(cells)
     known = np.zeros(len(cells), dtype=np.bool_)
     known[inside] = window.count[tuple(cells[inside].T)] > 0

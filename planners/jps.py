@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -53,6 +53,14 @@ class JPS:
         self.query = 0
         self.heap = np.empty((FIRST_ROOM, 2), dtype=np.int64)
         self.jumps: Jumps | None = None
+
+    def twin(self) -> Self:
+        """Return an engine for another thread: what jumps are looked up in is shared."""
+        if self.jumps is None:
+            self.jumps = self.look_up()
+        other = type(self)(self.costmap)
+        other.jumps = self.jumps
+        return other
 
     def look_up(self) -> Jumps:
         """Return what jumps are looked up in: made for the first search, kept for the others."""

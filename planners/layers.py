@@ -20,6 +20,7 @@ from planners.lattice import squared_need
 from planners.problem import PlanningProblem
 
 MOST_CELLS = 2**25  # of a costmap: what is held of it takes about 50 bytes for each
+EDGE = 5e-10  # [m] squares farther by less come within the clear radius, up to rounding
 
 
 class Layers(NamedTuple):
@@ -66,7 +67,18 @@ def metres(squared: Ints32, resolution: float) -> Floats:
 
 
 def padded_window(problem: PlanningProblem) -> GridWindow:
-    """Return the touched tiles, the cleared start, and a ring of cells around them."""
+    """Return the touched tiles, the cleared start, and a ring of cells around them.
+
+    Raises
+    ------
+    ProblemError
+        More than `MOST_CELLS` cells.
+    """
+    return problem.grid.window(padded_bounds(problem))
+
+
+def padded_bounds(problem: PlanningProblem) -> Floats:
+    """Return the box of `padded_window`: lower then upper corner [m, map]."""
     grid = problem.grid
     bounds = grid.bounds()
     if problem.clear_start:
@@ -91,7 +103,8 @@ def padded_window(problem: PlanningProblem) -> GridWindow:
             f"{problem.clear_radius:g} m around {problem.clear_place}, which makes {cells:.3g}",
             hint="Give a smaller footprint or clear_start_radius, or map with larger cells.",
         )
-    return grid.window(bounds + ring)
+    padded: Floats = bounds + ring
+    return padded
 
 
 def _near_start(problem: PlanningProblem, window: GridWindow) -> Bools:
@@ -103,5 +116,6 @@ def _near_start(problem: PlanningProblem, window: GridWindow) -> Bools:
     col, row = np.arange(cols), np.arange(rows)
     dx = np.maximum(np.maximum(col - x, x - col - 1), 0.0)
     dy = np.maximum(np.maximum(row - y, y - row - 1), 0.0)
-    near: Bools = np.hypot(dx, dy[:, None]) * window.resolution <= problem.clear_radius
+    away = np.hypot(dx, dy[:, None]) * window.resolution
+    near: Bools = away <= problem.clear_radius + EDGE
     return near

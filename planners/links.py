@@ -60,4 +60,4 @@ def is_clear(costmap: Costmap, a: Point, b: Point, *, radius: float) -> bool:
         return False
     need = (radius - SLACK) / costmap.window.resolution
     (ax, ay), (bx, by) = a, b
-    return segment_clearance(costmap.blocked, ax, ay, bx, by, math.inf) >= need
+    return need <= 0 or segment_clearance(costmap.blocked, ax, ay, bx, by, need) >= need

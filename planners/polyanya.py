@@ -76,6 +76,12 @@ class Polyanya:
         self.costmap = costmap
         self.pool = _pool(FIRST_ROOM)
 
+    def twin(self) -> Polyanya:
+        """Return an engine for another thread: the mesh is shared."""
+        other = Polyanya(self.costmap)
+        other.mesh = self.mesh
+        return other
+
     @cached_property
     def mesh(self) -> NavigationMesh:
         """The region that routes may use."""

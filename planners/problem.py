@@ -135,16 +135,15 @@ got (0, nan).
         return tuple(map(float, self.goal[: self.grid.ndim]))
 
     @property
-    def clear_place(self) -> tuple[float, ...]:
+    def clear_place(self) -> Point:
         """Where unknown cells count as free: x, y (in 3-D: x, y, z) [m, map]."""
         place = self.start if self.cleared_at is None else self.cleared_at
-        return tuple(float(value) for value in place[: self.grid.ndim])
+        return tuple(map(float, place[: self.grid.ndim]))
 
     @property
     def clears_its_start(self) -> bool:
         """Whether unknown cells around the very start count as free."""
-        start = tuple(float(value) for value in self.start[: self.grid.ndim])
-        return self.clear_start and self.clear_place == start
+        return self.clear_start and self.clear_place == self.start_xy
 
     @property
     def clear_radius(self) -> float:
@@ -160,7 +159,7 @@ def _pose(name: str, values: Sequence[float] | Floats, ndim: int) -> tuple[float
     if not isinstance(values, (Sequence, np.ndarray)) or isinstance(values, str):
         raise ProblemError(name, expected, repr(values))
     try:
-        pose = tuple(float(value) for value in values)
+        pose = () if isinstance(values, str) else tuple(float(value) for value in values)
     except (TypeError, ValueError) as error:
         raise ProblemError(name, expected, repr(values)) from error
     if len(pose) not in (ndim, ndim + 1) or not np.isfinite(pose).all():

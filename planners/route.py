@@ -62,7 +62,8 @@ class Route:
     frame : str
         Frame of the waypoints.
     audit : str
-        "clean": a route that the audit refuses is never handed out.
+        "clean": a route that the audit refuses is never handed out; "skipped" where
+        `planners.plan_many` was told to do without.
     """
 
     waypoints: Floats

@@ -10,9 +10,11 @@ from planners.astar3d import AStar3D
 from planners.costmap import Costmap
 from planners.enclosure import enclosed
 from planners.enclosure3d import enclosed_3d
-from planners.engine import Engine
+from planners.engine import Engine, Pose
+from planners.errors import ProblemError
 from planners.route import Route
 from planners.voxels import Voxels
+from planners.wording import Place
 
 
 def solve(
@@ -41,12 +43,18 @@ def solve(
 
     Raises
     ------
+    ProblemError
+        A start or a goal without a yaw, for a planner that heeds headings.
     NonFreeError, UnknownSpaceError, EnclosedError, TimeLimitError
     """
     problem = space.problem
     start, goal = tuple(map(float, problem.start)), tuple(map(float, problem.goal))
-    check_space(space, "start", start, headings=headings)
-    check_space(space, "goal", goal, headings=headings)
+    places: tuple[tuple[Place, Pose], ...] = ("start", start), ("goal", goal)
+    for place, pose in places:
+        if headings and len(pose) == 2:
+            expected = f"x, y [m] and yaw [rad] for {engine.name}"
+            raise ProblemError(place, expected, str(pose))
+        check_space(space, place, pose, headings=headings)
     found = engine.search(start, goal, settings)
     if found is None:
         if isinstance(space, Voxels):

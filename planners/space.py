@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Protocol
 
 import numpy.typing as npt
@@ -53,7 +54,9 @@ class Space(Protocol):
         """Return positions in cells."""
         ...
 
-    def clearance_of(self, points: npt.ArrayLike, *, to: Bools | None = None) -> float:
+    def clearance_of(
+        self, points: npt.ArrayLike, *, to: Bools | None = None, limit: float = math.inf
+    ) -> float:
         """Return the exact distance of a point or a polyline to what is blocked [m]."""
         ...
 

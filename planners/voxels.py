@@ -14,6 +14,7 @@ from groundmap.window import CellState, GridWindow
 from planners.errors import ProblemError
 from planners.kernels.clearance3d import line_clearance, segment_clearance
 from planners.lattice import squared_need
+from planners.layers import EDGE
 from planners.problem import PlanningProblem
 
 MOST_VOXELS = 2**25  # a search takes 20 bytes for each
@@ -96,7 +97,9 @@ class Voxels:
         shifted: Floats = np.atleast_2d(np.asarray(points, dtype=np.float64)) - self.window.origin
         return shifted / self.window.resolution
 
-    def clearance_of(self, points: npt.ArrayLike, *, to: Bools | None = None) -> float:
+    def clearance_of(
+        self, points: npt.ArrayLike, *, to: Bools | None = None, limit: float = math.inf
+    ) -> float:
         """Return the exact distance of a point or a polyline to the nearest blocked cube [m].
 
         Parameters
@@ -104,9 +107,11 @@ class Voxels:
         points : array_like, shape (3,) or (n, 3) [m, map]
         to : ndarray of bool, shape (layers, rows, cols), optional
             Other voxels than the blocked ones.
+        limit : float, default inf [m]
+            Nothing farther away is looked for.
         """
-        mask = self.blocked if to is None else to
-        return line_clearance(mask, self.to_cells(points)) * self.window.resolution
+        mask, size = self.blocked if to is None else to, self.window.resolution
+        return line_clearance(mask, self.to_cells(points), limit / size) * size
 
 
 def squared_distances(blocked: Bools, cap: int) -> Ints32:
@@ -182,5 +187,5 @@ def _near_start(problem: PlanningProblem, window: GridWindow) -> Bools:
         first = np.arange(length)
         gaps = np.maximum(np.maximum(first - at, at - first - 1), 0.0)
         squared = squared + np.expand_dims(gaps**2, [k for k in range(3) if k != axis])
-    near: Bools = np.sqrt(squared) * window.resolution <= problem.clear_radius
+    near: Bools = np.sqrt(squared) * window.resolution <= problem.clear_radius + EDGE
     return near

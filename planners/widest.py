@@ -159,12 +159,13 @@ def _shortest(squared: Ints32, key: int, sources: Ints, targets: Ints) -> Ints:
         h = astar.estimate(row, col, end)
         state[astar.SIZE] = push(heap, state[astar.SIZE], cost + h, h, row * width + col)
     status = astar.HEAP_FULL
-    while status != astar.FOUND:
+    while status == astar.HEAP_FULL:
         status = astar.advance(
             moves, costs, STEPS, width, end, astar.UNIT, labels, 1, heap, state, squared.size + 1
         )
         if status == astar.HEAP_FULL:
             heap = np.concatenate([heap, np.empty_like(heap)])
+    assert status == astar.FOUND
     turns = astar.trace(labels, width, int(state[astar.TARGET]))[::-1]
     return _filled(np.column_stack(np.divmod(turns, width)))
 

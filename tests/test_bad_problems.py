@@ -224,3 +224,32 @@ def test_a_winding_corridor_one_cell_wide_is_driven_by_who_can_turn_on_the_spot(
             plan(asked, planner)
     else:
         assert plan(asked, planner).length == pytest.approx(64 * 127 + 63 * 2)
+
+
+@pytest.mark.parametrize("planner", ["astar", "ara", "dijkstra", "dstar_lite"])
+def test_dear_metres_make_no_way_from_a_place_to_itself(planner: str) -> None:
+    dear = CostSettings(confidence_weight=1.0)
+    route = plan(problem(start=(9, 9), goal=(9, 9), costs=dear), planner)
+    assert (route.length, route.cost) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("values", "name"),
+    [
+        ({"start": "12"}, "start"),
+        ({"clear_start_radius": "wide"}, "clear_start_radius"),
+        ({"epsilon": None}, "epsilon"),
+    ],
+)
+def test_what_is_no_number_is_refused_by_name(values: dict[str, Any], name: str) -> None:
+    with pytest.raises(ProblemError, match=rf"^{name}: expected"):
+        problem(**values)
+
+
+def test_an_outline_without_a_yaw_is_asked_for_one() -> None:
+    z = np.full((64, 64), BLOCKED)
+    z[30:34] = FREE  # wide enough for the outline, not for the disc around it
+    car = [(-2.0, -1.0), (6.0, -1.0), (6.0, 1.0), (-2.0, 1.0)]
+    asked = problem(grid_of(z), start=(9, 32, 0), goal=(40, 32), footprint=car)
+    with pytest.raises(ProblemError, match=r"goal: expected x, y \[m\] and yaw \[rad\]"):
+        plan(asked, "hybrid_astar")

@@ -195,7 +195,7 @@ def test_plan_says_why_there_is_no_route(
         (("--clearance-weight", "-1"), "clearance_weight: expected greater than or equal to 0"),
         (
             ("--planner", "all", "--set", "weight=3"),
-            "--out, --set, --shortcut and --smooth don't go with all",
+            "are for one planner, not all",
         ),
     ],
 )

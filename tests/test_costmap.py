@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from groundmap.arrays import Bools, Floats32
+from groundmap.grid import ConfidenceGrid
 from oracles_planning import (
     BLOCKED,
     FREE,
@@ -20,7 +21,7 @@ from oracles_planning import (
     move_allowed,
     union_of_squares,
 )
-from planners import CostSettings, PlanningProblem
+from planners import CostSettings, PlanningProblem, ProblemError
 from planners.costmap import Costmap
 from planners.kernels.astar import COLS, ROWS
 from planners.kernels.distance import NOWHERE, squared_distances
@@ -210,3 +211,41 @@ def test_nothing_changed_changes_nothing() -> None:
         PlanningProblem(grid_of(free_field(9, 9)), start=(2, 2), goal=(5, 5), footprint=1.0)
     )
     assert costmap.updated(np.empty((0, 2), dtype=np.int64)) is costmap
+
+
+@pytest.mark.parametrize("inflation", [1.35, 1.5, 1.8, 2.7])
+def test_beyond_the_inflation_radius_no_clearance_costs(inflation: float) -> None:
+    grid = ConfidenceGrid(resolution=0.15)  # in whose half cells 1.8 m are 24, up to rounding
+    grid.fuse(np.array([0, 0]), free_field(64, 64))
+    near = CostSettings(clearance_weight=5.0, inflation_radius=inflation, cost_scaling_factor=0.5)
+    places = {"start": (4.8, 4.8), "goal": (4.8, 4.8), "footprint": 0.3}
+    costmap = Costmap.of(PlanningProblem(grid, **places, costs=near))  # type: ignore[arg-type]
+    assert (costmap.costs[costmap.clearance > inflation + 1e-9] == 0).all()
+    assert (costmap.costs[costmap.clearance < inflation - 1e-9] > 0).all()
+
+
+def test_what_is_exactly_within_the_clear_radius_is_cleared_in_any_window() -> None:
+    rng = np.random.default_rng(0)
+    for resolution in (0.05, 0.1, 0.15, 0.1524):
+        grid = ConfidenceGrid(resolution=resolution, origin=(-3.3, 0.0))
+        field = np.where(rng.random((64, 64)) < 0.5, FREE, UNSEEN).astype(np.float32)
+        grid.fuse(np.array([0, 0]), field)
+        start = tuple((grid.origin + 31 * resolution).tolist())  # a corner of cells
+        for cells in range(4, 20):
+            problem = PlanningProblem(
+                grid, start=start, goal=start, footprint=0.1, clear_start_radius=cells * resolution
+            )
+            costmap = Costmap.of(problem)
+            changed = rng.integers(20, 44, (2, 2))
+            for cell in changed:
+                grid.fuse(cell, np.full((1, 1), BLOCKED, dtype=np.float32))
+            updated, anew = costmap.updated(changed), Costmap.of(problem)
+            np.testing.assert_array_equal(updated.cleared, anew.cleared)
+            np.testing.assert_array_equal(updated.costs, anew.costs)
+
+
+@pytest.mark.parametrize("changed", [[1, 2, 3, 4], [[1, 2, 3, 4]], [[1.5, 2.0]], "ab"])
+def test_changed_cells_are_rows_of_two_whole_numbers(changed: object) -> None:
+    problem = PlanningProblem(grid_of(free_field(8, 8)), start=(4, 4), goal=(4, 4), footprint=1.0)
+    with pytest.raises(ProblemError, match=r"changed: expected whole numbers \[row, col\]"):
+        Costmap.of(problem).updated(changed)  # type: ignore[arg-type]

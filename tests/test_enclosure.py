@@ -85,7 +85,7 @@ def test_a_width_near_what_is_needed_is_an_estimate() -> None:
 def test_a_slanted_gap_is_wider_than_the_lattice_says_by_less_than_the_slack() -> None:
     z = free_field(40, 40)
     z[:18, :20] = z[20:, 23:] = BLOCKED  # corners at (20, 18) and (23, 20)
-    ends = {"start": (10.5, 30.5), "goal": (30.5, 10.5), "clear_start": False}
+    ends: dict[str, Any] = {"start": (10.5, 30.5), "goal": (30.5, 10.5), "clear_start": False}
     problem = PlanningProblem(grid_of(z), footprint=1.75, **ends)
     true_width = math.hypot(3, 2)
     assert widest_route(problem).width <= true_width <= widest_route(problem).width + 0.7072

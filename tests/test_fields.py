@@ -191,3 +191,9 @@ def test_a_3d_map_is_refused() -> None:
 def test_a_time_limit_of_zero_is_over_at_once() -> None:
     with pytest.raises(TimeLimitError, match="distance_field: no route within time_limit = 0 s"):
         distance_field(drawn(1), (3.0, 3.0), time_limit=0)
+
+
+@pytest.mark.parametrize("radius", [-1.0, np.nan, np.inf])
+def test_no_radius_is_below_0_or_not_finite(radius: float) -> None:
+    with pytest.raises(ProblemError, match=f"radius: expected .* 0 or more .*, got {radius}"):
+        reachable(problem_on(np.zeros((4, 4), dtype=np.bool_)), (0.5, 0.5), radius=radius)

@@ -25,6 +25,7 @@ from planners import (
     ProblemError,
     Route,
     TimeLimitError,
+    UnknownSpaceError,
     plan,
 )
 from planners.incremental import IncrementalPlanner
@@ -197,3 +198,40 @@ def test_what_was_cleared_around_the_start_is_unknown_again_once_the_robot_is_el
         else:
             with pytest.raises(EnclosedError, match="is fenced in"):
                 planner.plan(start=start)
+
+
+def test_a_start_on_ground_that_came_after_what_is_cleared_is_looked_at() -> None:
+    grid = ConfidenceGrid(resolution=0.1)
+    grid.fuse(np.array([0, 0]), free_field(64, 64))
+    here = {"start": (5.9, 3.0), "goal": (3.0, 3.0), "footprint": 0.2}
+    planner = IncrementalPlanner(
+        PlanningProblem(grid, **here, cleared_at=(5.9, 3.0), clear_start_radius=2.0)  # type: ignore[arg-type]
+    )
+    planner.plan()
+    grid.fuse(np.array([30, 66]), free_field(1, 3))  # a tile that the window doesn't hold
+    planner.update([[30, 66], [30, 67], [30, 68]])
+    with pytest.raises(UnknownSpaceError, match=r"start \(10.00, 3.00\)"):
+        planner.plan(start=(10.0, 3.0))
+
+
+def test_what_only_touched_the_clear_radius_is_unknown_again_once_the_robot_is_gone() -> None:
+    z = free_field(SIDE, SIDE)
+    z[5] = UNSEEN  # a band across, which the first start stands beside
+    problem = PlanningProblem(grid_of(z), start=(8, 6), goal=(8.5, 2.5), footprint=0.0)
+    planner = IncrementalPlanner(problem)
+    assert planner.plan().unknown_length > 0.0
+    with pytest.raises(EnclosedError, match="fenced in"):
+        planner.plan(start=(8.5, 10.5))
+
+
+def test_a_map_that_grew_within_the_margin_is_planned_on_as_a_whole() -> None:
+    grid = ConfidenceGrid(resolution=0.1)
+    grid.fuse(np.array([0, 0]), free_field(64, 64))
+    here = {"start": (5.9, 3.0), "goal": (3.0, 1.0), "footprint": 0.2}
+    planner = IncrementalPlanner(
+        PlanningProblem(grid, **here, unknown="allow", clear_start_radius=2.0)  # type: ignore[arg-type]
+    )
+    planner.plan()
+    wall = [put(grid, 20, col, BLOCKED) for col in range(80)]  # around it there is only the margin
+    planner.update(wall)
+    assert planner.plan().cost == pytest.approx(plan(planner.problem).cost)

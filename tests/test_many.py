@@ -30,7 +30,9 @@ from planners import (
 from planners.astar import AStar, AStarSettings
 from planners.costmap import Costmap
 from planners.engine import Found, Pose, SearchSettings
+from planners.jps import JPSPlus
 from planners.many import plan_many
+from planners.polyanya import Polyanya
 from planners.registry import PLANNERS, Planner
 
 SIDE = 40
@@ -228,3 +230,13 @@ def test_an_engine_without_twins_is_built_for_each_thread(monkeypatch: pytest.Mo
     plan_many(problem_of(3), pairs_of(3, count=2), "counted", threads=8)
     assert len(built) == 2  # not more than there are queries
     assert built[0] is built[1]
+
+
+@pytest.mark.parametrize(("planner", "shared"), [(JPSPlus, "jumps"), (Polyanya, "mesh")])
+def test_what_engines_work_out_about_a_map_is_shared(planner: type[Any], shared: str) -> None:
+    first = planner(Costmap.of(problem_of(0)))
+    twin = first.twin()
+    assert getattr(twin, shared) is getattr(first, shared)
+    start, goal = (6.0, 6.0), (9.0, 9.0)
+    asked = [engine.search(start, goal, SearchSettings()) for engine in (first, twin)]
+    np.testing.assert_array_equal(asked[0].waypoints, asked[1].waypoints)

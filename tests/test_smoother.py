@@ -14,8 +14,16 @@ from hypothesis import strategies as st
 from scipy.optimize import NonlinearConstraint, minimize
 
 from groundmap.arrays import Bools, Floats, Floats32
+from groundmap.errors import InputError
 from oracles_planning import BLOCKED, FREE, free_field, grid_of, masks, union_of_squares
-from planners import CostSettings, NoRouteError, PlanningProblem, ProblemError, plan
+from planners import (
+    CostSettings,
+    NoRouteError,
+    PlanningProblem,
+    ProblemError,
+    TimeLimitError,
+    plan,
+)
 from planners.audit import audit
 from planners.errors import SmoothingError
 from planners.kernels.smooth import STIFF, TENSION, free_discs, nearest, relax
@@ -354,7 +362,7 @@ def test_relaxing_ends_at_the_optimum() -> None:
 @pytest.mark.parametrize("turning_radius", [0.0, -1.0, math.nan, math.inf])
 def test_a_turning_radius_that_is_none_is_refused(turning_radius: float) -> None:
     problem = PlanningProblem(grid_of(free_field(64, 64)), start=(5, 5), goal=(9, 9), footprint=1)
-    with pytest.raises(ProblemError, match="turning_radius: expected a radius from 0.01 to 1000"):
+    with pytest.raises(ProblemError, match=r"turning_radius: expected a radius from 0\.01 to 1000"):
         smooth(problem, plan(problem), turning_radius=turning_radius)
 
 

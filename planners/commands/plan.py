@@ -16,9 +16,9 @@ from planners.commands.options import assignments, outline
 from planners.commands.plot import check_flat, draw_map
 from planners.console import JsonOption, emit, emit_rows, numbers, patiently, watched
 from planners.costs import CostSettings
-from planners.errors import NoRouteError, PlanningError
-from planners.problem import PlanningProblem, Unknown
-from planners.registry import PLANNERS, plan
+from planners.errors import NoRouteError, ProblemError
+from planners.problem import PLAIN, PlanningProblem, Unknown
+from planners.registry import PLANNERS, named, plan
 from planners.route import Route, check_route_file
 from planners.shortcuts import shortcut
 from planners.smoother import smooth
@@ -26,7 +26,6 @@ from planners.smoother import smooth
 ALL = "all"  # instead of a planner's name
 COLUMNS = ("length", "cost", "bound", "min_clearance", "mean_clearance", "min_confidence",
            "mean_confidence", "expanded", "seconds")  # fmt: skip
-PLAIN = CostSettings()
 SETTINGS = "; ".join(
     f"{name}: {', '.join(own)}"
     for name, entry in sorted(PLANNERS.items())
@@ -102,7 +101,8 @@ def plan_command(
     if plot is not None:
         check_picture(plot, sources=files_of(map_file))
     if planner == ALL and (out or settings or straighten or turning_radius is not None):
-        raise typer.BadParameter(f"--out, --set, --shortcut and --smooth don't go with {ALL}")
+        options = "--out, --set, --shortcut and --smooth"
+        raise typer.BadParameter(f"{options} are for one planner, not {ALL}")
     if inflation_radius != PLAIN.inflation_radius and clearance_weight == 0:
         raise typer.BadParameter("--inflation-radius needs a --clearance-weight above 0")
     grid = load_map(map_file)
@@ -127,6 +127,7 @@ def plan_command(
         return
     with patiently("planning; what was never used before is compiled now"):
         chosen = {"time_limit": time_limit, **assignments(settings or [])}
+        named(planner).settings(**chosen)  # a name that `plan` takes itself is no setting
         route = plan(problem, planner, **chosen)
         if turning_radius is not None:
             route = smooth(problem, route, turning_radius=turning_radius)
@@ -151,19 +152,17 @@ def _compare(
     """Plan with every planner there is; say why one brings no route, and go on."""
     routes: dict[str, Route] = {}
     refused: dict[str, str] = {}
-    failures: list[NoRouteError] = []
+    failures: list[NoRouteError | ProblemError] = []
     names = sorted(PLANNERS)
     for name in watched(names, total=len(names), what="planners"):
         _warm_up(name)  # the table's seconds are those of planning, not of compiling
         try:
             routes[name] = plan(problem, name, time_limit=time_limit)
-        except NoRouteError as error:
+        except (NoRouteError, ProblemError) as error:
             refused[name] = str(error)
             failures.append(error)
-        except PlanningError as error:
-            refused[name] = str(error)
-    if not routes and failures:
-        raise failures[0]
+    if not routes:
+        raise next((e for e in failures if isinstance(e, NoRouteError)), failures[0])
     if plot is not None:
         lines = {name: route.waypoints for name, route in routes.items()}
         draw_map(problem.grid, plot, lines=lines)

@@ -3,7 +3,7 @@
 Costs are integers: a cell's side is `ONE`, its diagonal `DIAGONAL`, more where cells are dear.
 Sums are then exact, a query and its reverse cost the same, and equal keys really tie (with floats,
 f = g + h of equally good nodes differs in the last bit, and tie-breaking is lost). 2^-32 of a cell
-is the rounding per move; int64 holds paths of 2^31 cells.
+is the rounding per move; int64 holds paths of 2^31 cells, of fewer where they are dear.
 
 Moves are bits: bit k of ``moves[node]`` says whether the step (ROWS[k], COLS[k]) is allowed,
 counter-clockwise from east (+x): E, NE, N, NW, W, SW, S, SE.

@@ -55,22 +55,22 @@ def segment_clearance(
 
 
 @njit(cache=True, nogil=True)
-def line_clearance(blocked: Bools, points: Floats) -> float:
+def line_clearance(blocked: Bools, points: Floats, limit: float = math.inf) -> float:
     """Return the distance from a polyline to the nearest blocked square; inf if none is blocked.
 
     Parameters
     ----------
     blocked : ndarray of bool, shape (rows, cols)
     points : ndarray, shape (n, 2) [cells]
+    limit : float [cells]
+        Nothing farther away is looked for.
 
     Notes
     -----
     Segments are cut into pieces of at most a cell, whose boxes are small, and each piece is only
     asked whether it betters the pieces before it.
     """
-    best = segment_clearance(
-        blocked, points[0, 0], points[0, 1], points[0, 0], points[0, 1], math.inf
-    )
+    best = segment_clearance(blocked, points[0, 0], points[0, 1], points[0, 0], points[0, 1], limit)
     if math.isinf(best):  # the whole map was looked at
         return best
     for i in range(len(points) - 1):

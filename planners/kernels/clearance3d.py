@@ -69,20 +69,24 @@ def segment_clearance(blocked: Bools, a: Floats, b: Floats, limit: float) -> flo
 
 
 @njit(cache=True, nogil=True)
-def line_clearance(blocked: Bools, points: Floats) -> float:
+def line_clearance(blocked: Bools, points: Floats, limit: float = math.inf) -> float:
     """Return the distance from a polyline to the nearest blocked cube; inf if none is blocked.
 
     Parameters
     ----------
     blocked : ndarray of bool, shape (layers, rows, cols)
     points : ndarray, shape (n, 3) [voxels]
+    limit : float [voxels]
+        Nothing farther away is looked for.
 
     Notes
     -----
     Segments are cut into pieces of at most a voxel, whose boxes are small, and each piece is only
     asked whether it betters the pieces before it.
     """
-    best = segment_clearance(blocked, points[0], points[0], math.inf)
+    best = segment_clearance(blocked, points[0], points[0], limit)
+    if math.isinf(best):  # the whole map was looked at
+        return best
     for i in range(len(points) - 1):
         step = points[i + 1] - points[i]
         pieces = max(1, math.ceil(np.abs(step).max()))
