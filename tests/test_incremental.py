@@ -29,6 +29,7 @@ from planners import (
     plan,
 )
 from planners.incremental import IncrementalPlanner
+from planners.problem import Unknown
 
 SIDE = 16
 
@@ -57,20 +58,27 @@ def outcome(ask: Callable[[], Route]) -> tuple[str, float]:
 @given(
     st.integers(0, 2**32 - 1),
     st.sampled_from([CostSettings(), CostSettings(clearance_weight=2.0, inflation_radius=2.0)]),
+    st.tuples(
+        st.booleans(),
+        st.sampled_from([0.2, 0.6]),
+        st.sampled_from(["avoid", "avoid", "allow", "penalise"]),
+    ),
     st.booleans(),
-    st.sampled_from([0.2, 0.6]),
 )
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_each_plan_is_as_good_as_one_from_scratch(
-    seed: int, costs: CostSettings, clear_start: bool, radius: float
+    seed: int, costs: CostSettings, policy: tuple[bool, float, Unknown], on_corners: bool
 ) -> None:
+    clear_start, radius, unknown = policy
     rng = np.random.default_rng(seed)
     z = rng.choice([FREE, BLOCKED, UNSEEN], (SIDE, SIDE), p=[0.9, 0.06, 0.04])
     z[12:15, 12:15] = FREE
     problem = problem_on(z.astype(np.float32), radius)
-    planner = IncrementalPlanner(replace(problem, costs=costs, clear_start=clear_start))
+    asked = replace(problem, costs=costs, clear_start=clear_start, unknown=unknown)
+    planner = IncrementalPlanner(asked)
     for _ in range(6):
-        start = tuple(rng.uniform(0.2, SIDE, 2).tolist())
+        place = rng.uniform(0.2, SIDE, 2)
+        start = tuple((np.round(place) if on_corners else place).tolist())
         got = outcome(partial(planner.plan, start=start))
         expected = outcome(partial(plan, planner.problem, "astar"))
         assert got[0] == expected[0]
