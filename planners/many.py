@@ -94,7 +94,7 @@ def plan_many(
     """
     chosen = named(planner)
     options = chosen.settings(**settings)
-    problems = _problems(problem, pairs)
+    problems = _problems(problem, pairs, headings=chosen.headings)
     workers = min(_threads(threads), max(len(problems), 1))
     if not problems:
         return []
@@ -106,7 +106,9 @@ def plan_many(
         return list(pool.map(lambda asked: _answer(desk, asked), problems))
 
 
-def _problems(problem: PlanningProblem, pairs: Iterable[Pair]) -> list[PlanningProblem]:
+def _problems(
+    problem: PlanningProblem, pairs: Iterable[Pair], *, headings: bool
+) -> list[PlanningProblem]:
     """Return a problem for each pair; what they clear is the same."""
     if problem.grid.ndim != 2:
         raise ProblemError(
@@ -122,6 +124,8 @@ def _problems(problem: PlanningProblem, pairs: Iterable[Pair]) -> list[PlanningP
             asked = replace(problem, start=start, goal=goal, cleared_at=problem.clear_place)
         except ProblemError as error:
             raise ProblemError(f"pairs[{i}], {error.name}", error.expected, error.got) from error
+        if headings and 2 in (len(asked.start), len(asked.goal)):
+            raise ProblemError(f"pairs[{i}]", "a start and a goal with yaws [rad]", repr(pair))
         problems.append(asked)
     return problems
 

@@ -240,3 +240,9 @@ def test_what_engines_work_out_about_a_map_is_shared(planner: type[Any], shared:
     start, goal = (6.0, 6.0), (9.0, 9.0)
     asked = [engine.search(start, goal, SearchSettings()) for engine in (first, twin)]
     np.testing.assert_array_equal(asked[0].waypoints, asked[1].waypoints)
+
+
+def test_a_pair_without_yaws_is_named_where_they_are_needed() -> None:
+    pairs = [((6, 6, 0), (9, 9, 0)), ((6, 6), (9, 9))]
+    with pytest.raises(ProblemError, match=r"pairs\[1\]: expected a start and a goal with yaws"):
+        plan_many(problem_of(0), pairs, "hybrid_astar")

@@ -123,13 +123,14 @@ def test_a_path_for_ros_is_written(wall: Path, tmp_path: Path) -> None:
     assert len(message["poses"]) == len(ran.json["waypoints"])
 
 
-def test_a_map_of_map_server_can_be_planned_on(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["hall.yaml", "hall.yml"])
+def test_a_map_of_map_server_can_be_planned_on(tmp_path: Path, name: str) -> None:
     Image.fromarray(np.full((40, 60), 254, dtype=np.uint8)).save(tmp_path / "hall.pgm")
-    (tmp_path / "hall.yaml").write_text(
+    (tmp_path / name).write_text(
         "image: hall.pgm\nresolution: 0.1\norigin: [-1.0, -2.0, 0.0]\nnegate: 0\n"
         "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
     )
-    ran = plan(tmp_path / "hall.yaml", start="0,0", goal="4,1", footprint="0.3")
+    ran = plan(tmp_path / name, start="0,0", goal="4,1", footprint="0.3")
     assert ran.code == 0
     alone = plan(tmp_path / "hall.pgm", start="0,0", goal="4,1", footprint="0.3")
     assert alone.code == 2

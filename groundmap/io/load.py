@@ -16,6 +16,7 @@ IMAGES = {".bmp", ".gif", ".jpeg", ".jpg", ".pgm", ".png", ".tif", ".tiff"}
 LOADERS: dict[str, Callable[[Path], ConfidenceGrid]] = {
     ".npz": ConfidenceGrid.load,
     ".yaml": lambda path: grid_of(read_ros_map(path)),
+    ".yml": lambda path: grid_of(read_ros_map(path)),
     ".map": lambda path: grid_of(read_movingai_map(path)),
     ".3dmap": lambda path: grid_of(read_movingai_voxels(path)),
 }
@@ -24,9 +25,9 @@ LOADERS: dict[str, Callable[[Path], ConfidenceGrid]] = {
 def load_map(path: str | PathLike[str]) -> ConfidenceGrid:
     """Return the map in a file, whoever wrote it.
 
-    ``.npz``: a grid that `ConfidenceGrid.save` wrote; ``.yaml``: a map of Nav2's map_server, with
-    its image; ``.map`` and ``.3dmap``: maps of the MovingAI benchmark, with cells of 1 m. A file
-    with another suffix is read as if it ended in ``.npz``.
+    ``.npz``: a grid that `ConfidenceGrid.save` wrote; ``.yaml`` or ``.yml``: a map of Nav2's
+    map_server, with its image; ``.map`` and ``.3dmap``: maps of the MovingAI benchmark, with cells
+    of 1 m. A file with another suffix is read as if it ended in ``.npz``.
 
     Raises
     ------
@@ -57,7 +58,7 @@ def files_of(path: str | PathLike[str]) -> list[Path]:
     Raises
     ------
     FileFormatError
-        A ``.yaml`` that is missing, or names no image.
+        A ``.yaml`` or ``.yml`` that is missing, or names no image.
     """
     path = Path(path)
-    return [path, image_of(path)] if path.suffix.lower() == ".yaml" else [path]
+    return [path, image_of(path)] if path.suffix.lower() in (".yaml", ".yml") else [path]

@@ -96,7 +96,7 @@ def draw_map(
 
 def _beside(map_file: Path) -> Path:
     """Return a picture's name: for a map of map_server, none that its image may have."""
-    if map_file.suffix.lower() == ".yaml":
+    if map_file.suffix.lower() in (".yaml", ".yml"):
         return map_file.with_name(f"{map_file.stem}-plot.png")
     return map_file.with_suffix(".png")
 
