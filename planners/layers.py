@@ -37,7 +37,7 @@ def layers_of(problem: PlanningProblem, window: GridWindow) -> Layers:
     """Return the layers of a window; what lies outside it counts as not blocked."""
     states = window.states(epsilon=problem.epsilon)
     nonfree = states == CellState.NONFREE
-    cleared = _near_start(problem, window) & (states == CellState.UNKNOWN)
+    cleared = near_start(problem, window) & (states == CellState.UNKNOWN)
     free = (states == CellState.FREE) | cleared
     blocked = ~free if problem.avoids_unknown else nonfree
     squared = squared_distances(blocked, cap(problem))
@@ -67,7 +67,7 @@ def metres(squared: Ints32, resolution: float) -> Floats:
 
 
 def padded_window(problem: PlanningProblem) -> GridWindow:
-    """Return the touched tiles, the cleared start, and a ring of cells around them.
+    """Return the touched tiles, the cleared start, and a ring of cells around them, in 2-D or 3-D.
 
     Raises
     ------
@@ -80,14 +80,8 @@ def padded_window(problem: PlanningProblem) -> GridWindow:
 def padded_bounds(problem: PlanningProblem) -> Floats:
     """Return the box of `padded_window`: lower then upper corner [m, map]."""
     grid = problem.grid
-    bounds = grid.bounds()
-    if problem.clear_start:
-        start = np.array(problem.clear_place)
-        bounds[:2] = np.minimum(bounds[:2], start - problem.clear_radius)
-        bounds[2:] = np.maximum(bounds[2:], start + problem.clear_radius)
-    # One cell and a half: borders that rounding moves by a cell must not swallow the ring.
-    ring = 1.5 * grid.resolution * np.array([-1, -1, 1, 1])
-    mapped = float(np.prod((grid.bounds()[2:] - grid.bounds()[:2]) / grid.resolution))
+    lower, upper = grid.bounds().reshape(2, -1)
+    mapped = float(np.prod((upper - lower) / grid.resolution))
     if mapped > MOST_CELLS:
         raise ProblemError(
             "grid",
@@ -95,7 +89,11 @@ def padded_bounds(problem: PlanningProblem) -> Floats:
             f"{mapped:.3g}",
             hint="Map with larger cells.",
         )
-    cells = float(np.prod((bounds[2:] - bounds[:2]) / grid.resolution))
+    if problem.clear_start:
+        start = np.array(problem.clear_place)
+        lower = np.minimum(lower, start - problem.clear_radius)
+        upper = np.maximum(upper, start + problem.clear_radius)
+    cells = float(np.prod((upper - lower) / grid.resolution))
     if cells > MOST_CELLS:
         raise ProblemError(
             "footprint" if problem.cleared_at is None else "cleared_at",
@@ -103,19 +101,21 @@ def padded_bounds(problem: PlanningProblem) -> Floats:
             f"{problem.clear_radius:g} m around {problem.clear_place}, which makes {cells:.3g}",
             hint="Give a smaller footprint or clear_start_radius, or map with larger cells.",
         )
-    padded: Floats = bounds + ring
-    return padded
+    # One cell and a half: borders that rounding moves by a cell must not swallow the ring.
+    ring = 1.5 * grid.resolution
+    return np.concatenate([lower - ring, upper + ring])
 
 
-def _near_start(problem: PlanningProblem, window: GridWindow) -> Bools:
-    """Return which cells' squares come within the clear radius of the start."""
+def near_start(problem: PlanningProblem, window: GridWindow) -> Bools:
+    """Return which cells' squares (cubes) come within the clear radius of the cleared place."""
+    shape = window.count.shape
     if not problem.clear_start:
-        return np.zeros(window.count.shape, dtype=np.bool_)
-    rows, cols = window.count.shape
-    x, y = (np.array(problem.clear_place) - window.origin) / window.resolution
-    col, row = np.arange(cols), np.arange(rows)
-    dx = np.maximum(np.maximum(col - x, x - col - 1), 0.0)
-    dy = np.maximum(np.maximum(row - y, y - row - 1), 0.0)
-    away = np.hypot(dx, dy[:, None]) * window.resolution
-    near: Bools = away <= problem.clear_radius + EDGE
+        return np.zeros(shape, dtype=np.bool_)
+    position = (np.array(problem.clear_place) - window.origin) / window.resolution
+    squared = np.zeros((1,) * len(shape))
+    for axis, (length, at) in enumerate(zip(shape, position[::-1], strict=True)):
+        first = np.arange(length)
+        gaps = np.maximum(np.maximum(first - at, at - first - 1), 0.0)
+        squared = squared + np.expand_dims(gaps**2, [k for k in range(len(shape)) if k != axis])
+    near: Bools = np.sqrt(squared) * window.resolution <= problem.clear_radius + EDGE
     return near

@@ -14,10 +14,8 @@ from groundmap.window import CellState, GridWindow
 from planners.errors import ProblemError
 from planners.kernels.clearance3d import line_clearance, segment_clearance
 from planners.lattice import squared_need
-from planners.layers import EDGE
+from planners.layers import near_start, padded_window
 from planners.problem import PlanningProblem
-
-MOST_VOXELS = 2**25  # a search takes 20 bytes for each
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,10 +61,10 @@ class Voxels:
             A 2-D map, one that is too large, or costs other than length.
         """
         _check(problem)
-        window = _padded_window(problem)
+        window = padded_window(problem)
         states = window.states(epsilon=problem.epsilon)
         nonfree = states == CellState.NONFREE
-        cleared = _near_start(problem, window) & (states == CellState.UNKNOWN)
+        cleared = near_start(problem, window) & (states == CellState.UNKNOWN)
         free = (states == CellState.FREE) | cleared
         blocked = ~free if problem.avoids_unknown else nonfree
         return cls(problem, window, blocked, nonfree, cleared)
@@ -155,37 +153,3 @@ def _check(problem: PlanningProblem) -> None:
         raise ProblemError("unknown", "'avoid' or 'allow' on a 3-D map", "'penalise'")
     if problem.costs.top(penalise=False) > 0:
         raise ProblemError("costs", "none but length on a 3-D map", repr(problem.costs))
-
-
-def _padded_window(problem: PlanningProblem) -> GridWindow:
-    grid = problem.grid
-    bounds = grid.bounds()
-    if problem.clear_start:
-        start = np.array(problem.clear_place)
-        bounds[:3] = np.minimum(bounds[:3], start - problem.clear_radius)
-        bounds[3:] = np.maximum(bounds[3:], start + problem.clear_radius)
-    # One voxel and a half: borders that rounding moves by a voxel must not swallow the ring.
-    ring = 1.5 * grid.resolution * np.repeat([-1, 1], 3)
-    voxels = float(np.prod((bounds[3:] - bounds[:3]) / grid.resolution))
-    if voxels > MOST_VOXELS:
-        raise ProblemError(
-            "grid",
-            f"{MOST_VOXELS} voxels of map and cleared start at most",
-            f"{voxels:.3g}",
-            hint="Map with larger voxels, or give a smaller footprint.",
-        )
-    return grid.window(bounds + ring)
-
-
-def _near_start(problem: PlanningProblem, window: GridWindow) -> Bools:
-    """Return which voxels' cubes come within the clear radius of the start."""
-    if not problem.clear_start:
-        return np.zeros(window.count.shape, dtype=np.bool_)
-    position = (np.array(problem.clear_place) - window.origin) / window.resolution
-    squared = np.zeros((1, 1, 1))
-    for axis, (length, at) in enumerate(zip(window.count.shape, position[::-1], strict=True)):
-        first = np.arange(length)
-        gaps = np.maximum(np.maximum(first - at, at - first - 1), 0.0)
-        squared = squared + np.expand_dims(gaps**2, [k for k in range(3) if k != axis])
-    near: Bools = np.sqrt(squared) * window.resolution <= problem.clear_radius + EDGE
-    return near

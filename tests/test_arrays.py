@@ -38,7 +38,7 @@ def test_other_shapes_and_no_numbers_are_refused(
     values: object, shape: tuple[int | None, ...], message: str
 ) -> None:
     with pytest.raises(InputError, match=message):
-        as_floats("v", values, shape)  # type: ignore[arg-type]
+        as_floats("v", values, shape)  # type: ignore[arg-type] # what is refused
 
 
 def test_an_empty_list_is_an_empty_table() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -131,13 +132,20 @@ def test_unknown_voxels_near_the_start_count_as_free() -> None:
         ({"grid": ConfidenceGrid(), "start": (0, 0), "goal": (1, 1)}, "grid: expected a 3-D map"),
         ({"unknown": "penalise"}, "unknown: expected 'avoid' or 'allow' on a 3-D map"),
         ({"costs": CostSettings(clearance_weight=1.0)}, "costs: expected none but length on a 3-D"),
-        ({"clear_start_radius": 500.0}, "grid: expected 33554432 voxels of map and cleared start"),
+        (
+            {"clear_start_radius": 500.0},
+            "footprint: expected one that leaves 33554432 cells of map",
+        ),
     ],
 )
-def test_what_voxels_cannot_hold_is_refused(changes: dict[str, object], message: str) -> None:
-    asked = {"grid": cubes(np.zeros((2, 2, 2), dtype=bool)), "start": (1, 1, 1), "goal": (1, 1, 1)}
+def test_what_voxels_cannot_hold_is_refused(changes: dict[str, Any], message: str) -> None:
+    asked: dict[str, Any] = {
+        "grid": cubes(np.zeros((2, 2, 2), dtype=bool)),
+        "start": (1, 1, 1),
+        "goal": (1, 1, 1),
+    }
     with pytest.raises(ProblemError, match=message):
-        Voxels.of(PlanningProblem(**(asked | {"footprint": 0.0} | changes)))  # type: ignore[arg-type]
+        Voxels.of(PlanningProblem(**(asked | {"footprint": 0.0} | changes)))
 
 
 # Distances

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -115,11 +117,11 @@ CAR = [(-0.5, -0.6), (2.5, -0.6), (2.5, 0.6), (-0.5, 0.6)]
 HOOK = [(-0.5, -0.5), (2.5, -0.5), (2.5, 0.5), (1.5, 0.5), (1.5, -0.2), (-0.5, -0.2)]
 
 
-def car_problem(outline: list[tuple[float, float]], **ends: object) -> PlanningProblem:
+def car_problem(outline: list[tuple[float, float]], **ends: Any) -> PlanningProblem:
     z = free_field(64, 64)
     z[30, 30] = BLOCKED  # x and y from 30 to 31
-    asked = {"start": (20.0, 29.3, 0.0), "goal": (40.0, 29.3, 0.0)} | ends
-    return PlanningProblem(grid_of(z), footprint=outline, **asked)  # type: ignore[arg-type]
+    asked: dict[str, Any] = {"start": (20.0, 29.3, 0.0), "goal": (40.0, 29.3, 0.0)} | ends
+    return PlanningProblem(grid_of(z), footprint=outline, **asked)
 
 
 def drive(ys: float, *, turn: float = 0.0) -> tuple[Floats, Floats]:

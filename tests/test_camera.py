@@ -166,13 +166,13 @@ def test_pixels_of_another_shape_are_refused(shape: tuple[int, ...], expected: s
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
 def test_a_rig_without_length_focus_or_noise_is_refused(name: str, value: float) -> None:
     with pytest.raises(CameraError, match=rf"^{name}: expected a number above 0 \["):
-        replace(RIG, **{name: value})  # type: ignore[arg-type]
+        replace(RIG, **{name: value})  # type: ignore[arg-type] # mypy knows no names in a dict
 
 
 @pytest.mark.parametrize("name", ["cx", "cy"])
 def test_a_principal_point_that_is_not_finite_is_refused(name: str) -> None:
     with pytest.raises(CameraError, match=r"^cx, cy: expected finite numbers"):
-        replace(RIG, **{name: np.nan})  # type: ignore[arg-type]
+        replace(RIG, **{name: np.nan})  # type: ignore[arg-type] # as above
 
 
 def test_a_mounting_that_is_not_rigid_is_refused() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 import shapely
@@ -218,8 +220,8 @@ def test_beyond_the_inflation_radius_no_clearance_costs(inflation: float) -> Non
     grid = ConfidenceGrid(resolution=0.15)  # in whose half cells 1.8 m are 24, up to rounding
     grid.fuse(np.array([0, 0]), free_field(64, 64))
     near = CostSettings(clearance_weight=5.0, inflation_radius=inflation, cost_scaling_factor=0.5)
-    places = {"start": (4.8, 4.8), "goal": (4.8, 4.8), "footprint": 0.3}
-    costmap = Costmap.of(PlanningProblem(grid, **places, costs=near))  # type: ignore[arg-type]
+    places: dict[str, Any] = {"start": (4.8, 4.8), "goal": (4.8, 4.8), "footprint": 0.3}
+    costmap = Costmap.of(PlanningProblem(grid, **places, costs=near))
     assert (costmap.costs[costmap.clearance > inflation + 1e-9] == 0).all()
     assert (costmap.costs[costmap.clearance < inflation - 1e-9] > 0).all()
 
@@ -245,7 +247,7 @@ def test_what_is_exactly_within_the_clear_radius_is_cleared_in_any_window() -> N
 
 
 @pytest.mark.parametrize("changed", [[1, 2, 3, 4], [[1, 2, 3, 4]], [[1.5, 2.0]], "ab"])
-def test_changed_cells_are_rows_of_two_whole_numbers(changed: object) -> None:
+def test_changed_cells_are_rows_of_two_whole_numbers(changed: Any) -> None:
     problem = PlanningProblem(grid_of(free_field(8, 8)), start=(4, 4), goal=(4, 4), footprint=1.0)
     with pytest.raises(ProblemError, match=r"changed: expected whole numbers \[row, col\]"):
-        Costmap.of(problem).updated(changed)  # type: ignore[arg-type]
+        Costmap.of(problem).updated(changed)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.testing as npt
 import pytest
@@ -32,8 +34,8 @@ def spread(*shape: int) -> Floats:
     return np.broadcast_to(0.01 * np.eye(3), (*shape, 3, 3)).copy()
 
 
-def bare_view(**parts: object) -> View:
-    return View(T_map_base=np.eye(4), rig=RIG, **parts)  # type: ignore[arg-type]
+def bare_view(**parts: Any) -> View:
+    return View(T_map_base=np.eye(4), rig=RIG, **parts)
 
 
 @given(fates)
@@ -143,11 +145,11 @@ def test_ids_that_are_no_whole_numbers_are_refused() -> None:
 @pytest.mark.parametrize("name", ["point_ids", "segment_ids"])
 def test_ids_must_be_as_many_as_the_matches_given(name: str) -> None:
     # One match has no disparity, so there is one feature, but two matches were given.
-    pixels = {"points_px": [(355, 320, 275), (320, 320, 240)]}
+    pixels: dict[str, Any] = {"points_px": [(355, 320, 275), (320, 320, 240)]}
     if name == "segment_ids":
-        pixels = {"segments_px": [[(355, 320, 275)] * 2, [(320, 320, 240)] * 2]}  # type: ignore[list-item]
+        pixels = {"segments_px": [[(355, 320, 275)] * 2, [(320, 320, 240)] * 2]}
     with pytest.raises(InputError, match=rf"^{name}: expected shape \(2,\), got shape \(1,\)"):
-        View.from_pixels(np.eye(4), RIG, **pixels, **{name: [7]})  # type: ignore[arg-type]
+        View.from_pixels(np.eye(4), RIG, **(pixels | {name: [7]}))
 
 
 @pytest.mark.parametrize(

@@ -66,7 +66,9 @@ def plan_command(
     ] = "avoid",
     clear_start: Annotated[
         bool,
-        typer.Option(help="Count unknown cells within twice the footprint's radius as free."),
+        typer.Option(
+            help="Count unknown cells near the start as free: of a disc, within twice its radius."
+        ),
     ] = True,
     clearance_weight: Annotated[
         float, typer.Option(help="Extra cost of a metre that just clears obstacles [m/m].")
