@@ -17,6 +17,7 @@ from planners.errors import (
     SmoothingError,
     TimeLimitError,
     UnknownSpaceError,
+    UnsolvedError,
 )
 from planners.fields import distance_field, reachable
 from planners.footprint import Footprint
@@ -26,8 +27,9 @@ from planners.jps import JPSPlusSettings, JPSSettings
 from planners.many import plan_many
 from planners.polyanya import PolyanyaSettings
 from planners.problem import PlanningProblem
-from planners.registry import PLANNERS, plan
+from planners.registry import OWN_PLANNERS, PLANNERS, plan
 from planners.route import Route
+from planners.sampling_settings import SamplingSettings
 from planners.shortcuts import shortcut
 from planners.smoother import max_curvature, smooth
 from planners.theta import LazyThetaSettings, ThetaSettings
@@ -50,6 +52,7 @@ __all__ = [
     "LazyThetaSettings",
     "NoRouteError",
     "NonFreeError",
+    "OWN_PLANNERS",
     "OutsideMapError",
     "PLANNERS",
     "PlanningError",
@@ -57,10 +60,12 @@ __all__ = [
     "PolyanyaSettings",
     "ProblemError",
     "Route",
+    "SamplingSettings",
     "SmoothingError",
     "ThetaSettings",
     "TimeLimitError",
     "UnknownSpaceError",
+    "UnsolvedError",
     "WeightedAStarSettings",
     "WidestRoute",
     "distance_field",

@@ -11,6 +11,7 @@ from groundmap.arrays import Floats
 from groundmap.settings import Settings
 from planners.costmap import Costmap
 from planners.errors import ProblemError, TimeLimitError
+from planners.problem import PlanningProblem
 
 SLICE = 100_000  # expansions between two looks at the clock: about 20 ms
 
@@ -21,6 +22,10 @@ class SearchSettings(Settings):
     """What every planner can be told."""
 
     time_limit: float | None = Field(30.0, ge=0, description="search time [s]; none: no limit")
+
+    def heeds_headings(self, problem: PlanningProblem) -> bool:
+        """Whether a planner that knows headings heeds them, told this."""
+        return True
 
 
 class Found(NamedTuple):

@@ -10,7 +10,8 @@
     │   ├── UnknownSpaceError        the footprint overlaps unknown or contested space there
     │   ├── EnclosedError            start or goal is fenced in
     │   ├── SmoothingError           clearance allows no turns as wide as asked for
-    │   └── TimeLimitError           time ran out before the search ended
+    │   ├── TimeLimitError           time ran out before the search ended
+    │   └── UnsolvedError            a sampling planner ended without a route
     └── AuditError                   a planner's route that keeps not what was asked: a bug
 
 The exceptions take facts, keep them as attributes, and compose one sentence from them. Settings
@@ -25,6 +26,7 @@ from planners.wording import (
     Point,
     Turning,
     footprint_clause,
+    left_clause,
     named_place,
     nearest_clause,
     shown,
@@ -242,17 +244,57 @@ allows about 0.80 m. Ask for less, or for a planner that plans with turns.
 class TimeLimitError(NoRouteError):
     """Time ran out before the search ended: a route may or may not exist.
 
+    Parameters
+    ----------
+    planner : str
+    time_limit : float [s]
+    expanded : int
+        Nodes that were expanded; of sampling planners, edges that were checked.
+    left : float, optional [m]
+        What was left to the goal from the nearest place that a sampling planner reached.
+
     Examples
     --------
     >>> print(TimeLimitError("astar", time_limit=0.5, expanded=180000))
     astar: no route within time_limit = 0.5 s (180000 nodes expanded). Allow more time.
     """
 
-    def __init__(self, planner: str, *, time_limit: float, expanded: int) -> None:
+    def __init__(
+        self, planner: str, *, time_limit: float, expanded: int, left: float | None = None
+    ) -> None:
         self.planner, self.time_limit, self.expanded = planner, time_limit, expanded
+        self.left = left
         super().__init__(
             f"{planner}: no route within time_limit = {time_limit:g} s "
-            f"({expanded} nodes expanded). Allow more time."
+            f"({expanded} nodes expanded{left_clause(left)}). Allow more time."
+        )
+
+
+class UnsolvedError(NoRouteError):
+    """A sampling planner ended without a route: there may or may not be one.
+
+    Parameters
+    ----------
+    planner : str
+    reason : str
+        Why it ended.
+    expanded : int
+        Edges that were checked.
+    left : float, optional [m]
+        What was left to the goal from the nearest place that was reached.
+
+    Examples
+    --------
+    >>> print(UnsolvedError("rrt", reason="iterations = 500 are used up", expanded=480, left=3.2))
+    rrt: no route found: iterations = 500 are used up (480 edges checked, 3.20 m left to the goal).
+    """
+
+    def __init__(
+        self, planner: str, *, reason: str, expanded: int, left: float | None = None
+    ) -> None:
+        self.planner, self.reason, self.expanded, self.left = planner, reason, expanded, left
+        super().__init__(
+            f"{planner}: no route found: {reason} ({expanded} edges checked{left_clause(left)})."
         )
 
 

@@ -167,7 +167,7 @@ def _route(desk: _Desk, engine: Engine, problem: PlanningProblem) -> Route:
         engine,
         desk.settings,
         began=began,
-        headings=desk.headings,
+        headings=desk.headings and desk.settings.heeds_headings(problem),
         audited=desk.audited,
     )
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Iterator, MutableMapping
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 from planners.answers import check_on_map, space_of
@@ -17,6 +19,7 @@ from planners.astar import (
 )
 from planners.astar3d import AStar3D
 from planners.auto import Auto, AutoSettings
+from planners.costmap import Costmap
 from planners.dstar_lite import DStarLite, DStarLiteSettings
 from planners.engine import Engine, SearchSettings
 from planners.errors import ProblemError
@@ -25,6 +28,9 @@ from planners.jps import JPS, JPSPlus, JPSPlusSettings, JPSSettings
 from planners.polyanya import Polyanya, PolyanyaSettings
 from planners.problem import PlanningProblem
 from planners.route import Route
+from planners.sampler import Sampler
+from planners.sampling import samplers
+from planners.sampling_settings import SamplingSettings
 from planners.solve import solve
 from planners.theta import LazyTheta, LazyThetaSettings, Theta, ThetaSettings
 from planners.voxels import Voxels
@@ -35,12 +41,55 @@ SPATIAL = ("astar", "auto")  # planners that plan on 3-D maps, too
 class Planner(NamedTuple):
     """A planner: its engine, the class of its settings, and whether it heeds headings."""
 
-    engine: type[Engine]
+    engine: Callable[[Costmap], Engine]
     settings: type[SearchSettings]
     headings: bool = False
 
 
-PLANNERS: dict[str, Planner] = {
+class Planners(MutableMapping[str, Planner]):
+    """Planners by name: our own, and those of OMPL where it is installed.
+
+    OMPL is loaded by what can't be answered without it: a name that is not one of ours, or a list
+    of all. So neither an import of this package nor a plan with A* waits for it.
+
+    Parameters
+    ----------
+    own : dict
+
+    Examples
+    --------
+    >>> "astar" in PLANNERS, "no_such" in PLANNERS, sorted(OWN_PLANNERS)[:3]
+    (True, False, ['ara', 'astar', 'auto'])
+    """
+
+    def __init__(self, own: dict[str, Planner]) -> None:
+        self._own = own
+
+    def __getitem__(self, name: str) -> Planner:
+        return self._own[name] if name in self._own else _sampling()[name]
+
+    def __setitem__(self, name: str, planner: Planner) -> None:
+        self._own[name] = planner
+
+    def __delitem__(self, name: str) -> None:
+        del self._own[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._own | _sampling())
+
+    def __len__(self) -> int:
+        return len(self._own | _sampling())
+
+
+@cache
+def _sampling() -> dict[str, Planner]:
+    return {
+        name: Planner(partial(Sampler, name), SamplingSettings, headings=True)
+        for name in samplers()
+    }
+
+
+OWN_PLANNERS: dict[str, Planner] = {
     "astar": Planner(AStar, AStarSettings),
     "ara": Planner(ARA, ARASettings),
     "auto": Planner(Auto, AutoSettings),
@@ -54,6 +103,7 @@ PLANNERS: dict[str, Planner] = {
     "theta": Planner(Theta, ThetaSettings),
     "weighted_astar": Planner(WeightedAStar, WeightedAStarSettings),
 }
+PLANNERS = Planners(dict(OWN_PLANNERS))
 
 
 def plan(problem: PlanningProblem, planner: str = "astar", **settings: Any) -> Route:
@@ -79,6 +129,8 @@ def plan(problem: PlanningProblem, planner: str = "astar", **settings: Any) -> R
         No route joins them.
     TimeLimitError
         Time ran out.
+    UnsolvedError
+        A sampling planner ended without a route.
     AuditError
         The planner's route keeps not what was asked: a bug in the planner.
 
@@ -99,7 +151,8 @@ def plan(problem: PlanningProblem, planner: str = "astar", **settings: Any) -> R
     space = space_of(problem)
     if isinstance(space, Voxels):
         return solve(space, _engine_3d(space, planner), chosen, began=began)
-    return solve(space, entry.engine(space), chosen, began=began, headings=entry.headings)
+    headings = entry.headings and chosen.heeds_headings(problem)
+    return solve(space, entry.engine(space), chosen, began=began, headings=headings)
 
 
 def _engine_3d(space: Voxels, planner: str) -> AStar3D:
@@ -118,5 +171,10 @@ def named(planner: str) -> Planner:
         There is none; the sentence names those there are.
     """
     if not isinstance(planner, str) or planner not in PLANNERS:
-        raise ProblemError("planner", f"one of {', '.join(sorted(PLANNERS))}", repr(planner))
+        raise ProblemError(
+            "planner",
+            f"one of {', '.join(sorted(PLANNERS))}",
+            repr(planner),
+            hint="" if samplers() else "Sampling planners need OMPL: pip install ompl.",
+        )
     return PLANNERS[planner]

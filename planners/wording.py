@@ -59,6 +59,11 @@ def footprint_clause(radius: float, yaw: float | None) -> str:
     return f"the footprint, turned by {yaw:.2f} rad,"
 
 
+def left_clause(left: float | None) -> str:
+    """Return how much of the way is left; nothing if that is not known."""
+    return "" if left is None else f", {left:.2f} m left to the goal"
+
+
 def nearest_clause(xy: Point, nearest: Point | None) -> str:
     """Return a sentence on where to go instead; nothing if there is nowhere."""
     if nearest is None:

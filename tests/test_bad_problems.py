@@ -13,7 +13,7 @@ from groundmap.errors import SettingsError
 from groundmap.grid import ConfidenceGrid
 from oracles_planning import BLOCKED, FREE, free_field, grid_of
 from planners import (
-    PLANNERS,
+    OWN_PLANNERS,
     CostSettings,
     EnclosedError,
     NonFreeError,
@@ -28,7 +28,7 @@ from planners import (
 FIELD = grid_of(free_field(64, 64))
 ALONG: dict[str, Any] = {"start": (9.5, 9.5, 0), "goal": (50.5, 9.5, 0)}
 
-every_planner = pytest.mark.parametrize("planner", sorted(PLANNERS))
+every_planner = pytest.mark.parametrize("planner", sorted(OWN_PLANNERS))
 
 
 def problem(grid: ConfidenceGrid = FIELD, **values: Any) -> PlanningProblem:

@@ -10,7 +10,7 @@ import pytest
 
 from groundmap import CellState, ConfidenceGrid, GroundMapper, fit_ground, read_views
 from groundmap.arrays import Floats, Ints
-from planners import PLANNERS, IncrementalPlanner, NonFreeError, PlanningProblem, plan
+from planners import OWN_PLANNERS, IncrementalPlanner, NonFreeError, PlanningProblem, plan
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 
@@ -105,7 +105,7 @@ def street() -> ConfidenceGrid:
     return map_of(DRIVES[0]).grid
 
 
-@pytest.mark.parametrize("planner", sorted(PLANNERS))
+@pytest.mark.parametrize("planner", sorted(OWN_PLANNERS))
 def test_every_planner_drives_the_recorded_street(street: ConfidenceGrid, planner: str) -> None:
     first, last = street.trajectory[[0, -1]]
     route = plan(PlanningProblem(street, start=first, goal=last, footprint=0.9), planner)

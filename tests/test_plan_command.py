@@ -14,7 +14,7 @@ from PIL import Image
 
 from command_line import Ran, run
 from groundmap import ConfidenceGrid
-from planners import PLANNERS, max_curvature
+from planners import OWN_PLANNERS, max_curvature
 from planners.console import patiently
 
 
@@ -50,7 +50,7 @@ def test_all_planners_are_compared(wall: Path, tmp_path: Path) -> None:
     picture = tmp_path / "all.png"
     ran = plan(wall, "--planner", "all", "--plot", picture, start="3,3,0", goal="26,3,0")
     assert ran.code == 0
-    assert sorted(ran.json["routes"]) == sorted(PLANNERS)
+    assert sorted(ran.json["routes"]) == sorted(OWN_PLANNERS)
     assert ran.json["refused"] == {}
     with Image.open(picture) as image:
         assert min(image.size) > 300
@@ -59,7 +59,7 @@ def test_all_planners_are_compared(wall: Path, tmp_path: Path) -> None:
 def test_a_planner_that_can_not_is_named_and_the_others_go_on(wall: Path) -> None:
     ran = plan(wall, "--planner", "all", "--clearance-weight", "2")
     assert ran.code == 0
-    assert set(ran.json["routes"]) | set(ran.json["refused"]) == set(PLANNERS)
+    assert set(ran.json["routes"]) | set(ran.json["refused"]) == set(OWN_PLANNERS)
     assert "uniform costs" in ran.json["refused"]["jps"]
     assert "yaw" in ran.json["refused"]["hybrid_astar"]
     table = run(

@@ -13,7 +13,7 @@ from groundmap.arrays import Bools
 from groundmap.grid import ConfidenceGrid
 from oracles_planning import BLOCKED, FREE, free_field, grid_of
 from planners import (
-    PLANNERS,
+    OWN_PLANNERS,
     CostSettings,
     EnclosedError,
     NoRouteError,
@@ -28,7 +28,7 @@ from planners.costmap import Costmap
 EXACT = ["astar", "auto", "ara", "dijkstra", "dstar_lite", "jps", "jps+"]
 ANY_ANGLE = ["theta", "lazy_theta", "polyanya"]
 WEIGHING = ["astar", "auto", "ara", "dijkstra", "dstar_lite", "weighted_astar", "hybrid_astar"]
-FLAT = sorted(set(PLANNERS) - {"hybrid_astar"})  # those that know no heading
+FLAT = sorted(set(OWN_PLANNERS) - {"hybrid_astar"})  # those that know no heading
 RADII = [0.0, 0.5, 1.2]
 
 
@@ -133,7 +133,7 @@ def test_one_more_obstacle_never_shortens_the_way(problem: PlanningProblem, seed
             assert before.length <= after.length + 1e-9, planner
 
 
-@pytest.mark.parametrize("planner", sorted(set(PLANNERS) - set(WEIGHING)))
+@pytest.mark.parametrize("planner", sorted(set(OWN_PLANNERS) - set(WEIGHING)))
 def test_planners_that_cannot_weigh_cells_refuse_to(planner: str) -> None:
     problem = PlanningProblem(
         grid_of(free_field(32, 32)),
@@ -146,7 +146,7 @@ def test_planners_that_cannot_weigh_cells_refuse_to(planner: str) -> None:
         plan(problem, planner)
 
 
-@pytest.mark.parametrize("planner", sorted(PLANNERS))
+@pytest.mark.parametrize("planner", sorted(OWN_PLANNERS))
 def test_a_start_that_is_the_goal_is_a_route_of_no_length(planner: str) -> None:
     problem = PlanningProblem(
         grid_of(free_field(32, 32)), start=(9.3, 8.1, 0.5), goal=(9.3, 8.1, 0.5), footprint=1.0
@@ -156,7 +156,7 @@ def test_a_start_that_is_the_goal_is_a_route_of_no_length(planner: str) -> None:
     assert route.waypoints.tolist() == [[9.3, 8.1]] * 2
 
 
-@pytest.mark.parametrize("planner", sorted(PLANNERS))
+@pytest.mark.parametrize("planner", sorted(OWN_PLANNERS))
 def test_no_time_is_no_route(planner: str) -> None:
     problem = PlanningProblem(
         grid_of(free_field(32, 32)), start=(9.3, 8.1, 0.5), goal=(20.3, 18.1, 0.5), footprint=1.0
@@ -165,10 +165,10 @@ def test_no_time_is_no_route(planner: str) -> None:
         plan(problem, planner, time_limit=0)
 
 
-@pytest.mark.parametrize("planner", sorted(PLANNERS))
+@pytest.mark.parametrize("planner", sorted(OWN_PLANNERS))
 def test_a_planner_is_called_by_its_name(planner: str) -> None:
     if planner != "auto":
         problem = PlanningProblem(
             grid_of(free_field(9, 9)), start=(2, 2), goal=(5, 5), footprint=1.0
         )
-        assert PLANNERS[planner].engine(Costmap.of(problem)).name == planner
+        assert OWN_PLANNERS[planner].engine(Costmap.of(problem)).name == planner

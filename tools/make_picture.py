@@ -20,7 +20,7 @@ from groundmap.draw import (
     save_figure,
 )
 from groundmap.draw.views import draw_fan, draw_features, draw_triangulation
-from planners import PLANNERS, PlanningProblem, plan
+from planners import OWN_PLANNERS, PlanningProblem, plan
 from planners.commands.demo import FOOTPRINT, GOAL
 
 ROOT = Path(__file__).parent.parent
@@ -71,7 +71,7 @@ def draw_planners(grid: ConfidenceGrid) -> None:
     """Draw what every planner makes of the way through the courtyard's doorway."""
     start = grid.trajectory[0]
     problem = PlanningProblem(grid, start=start, goal=(*GOAL, 0.0), footprint=FOOTPRINT)
-    routes = {name: plan(problem, name).waypoints for name in sorted(PLANNERS)}
+    routes = {name: plan(problem, name).waypoints for name in sorted(OWN_PLANNERS)}
     figure, ax = new_figure(MAP_BOUNDS)
     draw_grid(grid, bounds=MAP_BOUNDS, ax=ax)
     if (legend := ax.get_legend()) is not None:

@@ -14,7 +14,7 @@ from groundmap.io.movingai_scen import MovingAIQuery
 from planners.astar3d import AStar3D
 from planners.costmap import Costmap
 from planners.engine import Engine, Found, SearchSettings
-from planners.errors import ProblemError, TimeLimitError
+from planners.errors import ProblemError, TimeLimitError, UnsolvedError
 from planners.polyline import length_of
 from planners.problem import PlanningProblem
 from planners.registry import named
@@ -53,14 +53,14 @@ class Arena:
         self.setup_ms = 1e3 * (time.perf_counter() - began)
 
     def ask(self, query: MovingAIQuery) -> Answer:
-        """Return the planner's answer; running out of time is none."""
+        """Return the planner's answer; running out of time, or of ideas, is none."""
         start, goal = (
             tuple(index + 0.5 for index in cell[::-1]) for cell in (query.start, query.goal)
         )
         began = time.perf_counter()
         try:
             found = self.engine.search(start, goal, self.settings)
-        except TimeLimitError:
+        except (TimeLimitError, UnsolvedError):
             return Answer(query, None, 1e3 * (time.perf_counter() - began), agrees=False)
         ms = 1e3 * (time.perf_counter() - began)
         if found is None:

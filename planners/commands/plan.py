@@ -18,7 +18,7 @@ from planners.console import JsonOption, emit, emit_rows, numbers, patiently, wa
 from planners.costs import CostSettings
 from planners.errors import NoRouteError, ProblemError
 from planners.problem import PLAIN, PlanningProblem, Unknown
-from planners.registry import PLANNERS, named, plan
+from planners.registry import OWN_PLANNERS, named, plan
 from planners.route import Route, check_route_file
 from planners.shortcuts import shortcut
 from planners.smoother import smooth
@@ -53,7 +53,10 @@ def plan_command(
     ],
     planner: Annotated[
         str,
-        typer.Option(help=f"Planner: {', '.join(sorted(PLANNERS))}; or all, to compare them."),
+        typer.Option(
+            help=f"Planner: {', '.join(sorted(OWN_PLANNERS))}; or all, to compare them; or one of"
+            " OMPL's, such as rrtconnect, if ompl is installed."
+        ),
     ] = "astar",
     out: Annotated[
         Path | None, typer.Option(help="Write the route: .geojson, .csv, or .yaml (a ROS path).")
@@ -151,11 +154,11 @@ def plan_command(
 def _compare(
     problem: PlanningProblem, plot: Path | None, time_limit: float, *, as_json: bool, title: str
 ) -> None:
-    """Plan with every planner there is; say why one brings no route, and go on."""
+    """Plan with every planner of our own; say why one brings no route, and go on."""
     routes: dict[str, Route] = {}
     refused: dict[str, str] = {}
     failures: list[NoRouteError | ProblemError] = []
-    names = sorted(PLANNERS)
+    names = sorted(OWN_PLANNERS)
     for name in watched(names, total=len(names), what="planners"):
         _warm_up(name)  # the table's seconds are those of planning, not of compiling
         try:

@@ -144,7 +144,7 @@ def motion_clear(
     reach = 0.5 * (abs(length) + turn * shape.arm)  # of any point, from the pose half-way
     excess = 0.5 * turn / steps * shape.arm + grow  # of the hulls over all the poses in between
     mid_x, mid_y, mid = along(x, y, yaw, curvature, 0.5 * length)
-    if _within(ground.clearance, mid_x, mid_y, 0.5 * abs(length)) and _covered(
+    if within(ground.clearance, mid_x, mid_y, 0.5 * abs(length)) and covered(
         ground.clearance, shape.discs, mid_x, mid_y, mid, reach + excess
     ):
         return True
@@ -154,12 +154,12 @@ def motion_clear(
     ax, ay, a = x, y, yaw
     for i in range(1, steps + 1):
         bx, by, b = along(x, y, yaw, curvature, length * i / steps)
-        if not _within(ground.clearance, bx, by, 0.0):
+        if not within(ground.clearance, bx, by, 0.0):
             return False
-        if _nearness(ground.clearance, bx, by)[1] < shape.inscribed - TOUCH:
+        if nearness(ground.clearance, bx, by)[1] < shape.inscribed - TOUCH:
             return False
         between = along(x, y, yaw, curvature, length * (i - 0.5) / steps)
-        if not _covered(ground.clearance, shape.discs, *between, slack) and not step_clear(
+        if not covered(ground.clearance, shape.discs, *between, slack) and not step_clear(
             ground, shape, ax, ay, a, bx, by, b, grow
         ):
             return False
@@ -202,14 +202,14 @@ def step_clear(
 
 
 @njit(cache=True, nogil=True)
-def _within(clearance: Floats, x: float, y: float, margin: float) -> bool:
+def within(clearance: Floats, x: float, y: float, margin: float) -> bool:
     """Whether a point lies on the map, and no nearer to its border than `margin`."""
     rows, cols = clearance.shape
     return bool(margin <= x < cols - margin and margin <= y < rows - margin)
 
 
 @njit(cache=True, nogil=True)
-def _nearness(clearance: Floats, x: float, y: float) -> tuple[float, float]:
+def nearness(clearance: Floats, x: float, y: float) -> tuple[float, float]:
     """Return bounds of the clearance at a point, from that at the centre of its cell."""
     rows, cols = clearance.shape
     col, row = math.floor(x), math.floor(y)
@@ -220,14 +220,12 @@ def _nearness(clearance: Floats, x: float, y: float) -> tuple[float, float]:
 
 
 @njit(cache=True, nogil=True)
-def _covered(
-    clearance: Floats, discs: Floats, x: float, y: float, yaw: float, slack: float
-) -> bool:
+def covered(clearance: Floats, discs: Floats, x: float, y: float, yaw: float, slack: float) -> bool:
     """Whether the discs that cover the footprint, `slack` larger, are clear at a pose."""
     cosine, sine = math.cos(yaw), math.sin(yaw)
     for k in range(len(discs)):
         u, v, radius = discs[k, 0], discs[k, 1], discs[k, 2]
         at_x, at_y = x + cosine * u - sine * v, y + sine * u + cosine * v
-        if _nearness(clearance, at_x, at_y)[0] < radius + slack:
+        if nearness(clearance, at_x, at_y)[0] < radius + slack:
             return False
     return True

@@ -1,0 +1,157 @@
+"""Where sampled states may be, whether edges between them are clear, and the poses along them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import pairwise
+from typing import TypeAlias
+
+import numpy as np
+from scipy import ndimage
+
+from groundmap.arrays import Floats
+from planners.costmap import Costmap
+from planners.engine import Pose
+from planners.hybrid_parts import ground_of, shape_of
+from planners.kernels.curves import wrap
+from planners.kernels.footprint import Shape
+from planners.kernels.hybrid import driven
+from planners.kernels.sampling import (
+    Body,
+    comes_later,
+    curve_clear,
+    curve_motions,
+    line_clear,
+    slide_clear,
+    slide_steps,
+)
+from planners.sampling_settings import TURNING, Space
+
+Bounds: TypeAlias = tuple[float, float, float, float]  # low x, low y, high x, high y [m, corner]
+
+
+class Ways:
+    """The edges of a space over a costmap, each checked by one compiled call.
+
+    States are x, y [m] from the map's outer corner and, but for "r2", a yaw [rad].
+
+    Parameters
+    ----------
+    costmap : Costmap
+    space : {"r2", "se2", "dubins", "reeds_shepp"}
+        Between two states lies: the straight line of a disc that holds the footprint; the same
+        for the footprint itself, turning evenly; the shortest curve.
+    turning_radius : float [m]
+        Of curves.
+
+    Attributes
+    ----------
+    is_clear : callable
+        Takes the numbers of two states; whether the footprint touches nothing in between.
+
+    Examples
+    --------
+    >>> from groundmap import ConfidenceGrid
+    >>> from planners.problem import PlanningProblem
+    >>> grid = ConfidenceGrid(resolution=0.5)
+    >>> field = np.full((64, 64), -1.0, dtype=np.float32)
+    >>> field[20:, 30] = 1.0
+    >>> grid.fuse(np.array([0, 0]), field)
+    >>> problem = PlanningProblem(grid, start=(2, 2), goal=(30, 2), footprint=0.9)
+    >>> ways = Ways(Costmap.of(problem), "r2", 1.0)
+    >>> start, low, high = (ways.state_of(xy) for xy in ((2, 2), (30, 2), (30, 20)))
+    >>> ways.is_clear(*start, *low), ways.is_clear(*start, *high)
+    (True, False)
+    """
+
+    is_clear: Callable[..., bool]
+
+    def __init__(self, costmap: Costmap, space: Space, turning_radius: float) -> None:
+        self.costmap, self.space = costmap, space
+        size = costmap.window.resolution
+        ground, self.shape = ground_of(costmap), shape_of(costmap.problem.shape, size)
+        self.body = Body(
+            *ground,
+            *self.shape[:3],
+            np.array([size, turning_radius / size, *self.shape[3:]]),
+        )
+        if space == "r2":
+            disc = costmap.problem.radius / size
+            self.is_clear = partial(line_clear, ground.blocked, ground.clearance, size, disc)
+        elif space == "se2":
+            self.is_clear = partial(slide_clear, *self.body)
+        else:
+            self.is_clear = partial(curve_clear, space == "dubins", *self.body)
+
+    def state_of(self, pose: Pose) -> Pose:
+        """Return a pose [map] as a state."""
+        x, y = (np.asarray(pose[:2]) - self.costmap.window.origin).tolist()
+        return (x, y) if self.space == "r2" else (x, y, wrap(pose[2]))
+
+    def are_clear(self, states: Sequence[Pose]) -> bool:
+        """Whether all edges of a path are clear."""
+        return all(self.is_clear(*a, *b) for a, b in pairwise(states))
+
+    def room(self, start: Pose, goal: Pose) -> Bounds | None:
+        """Return a box that holds all that can be reached, or None if the goal can't be.
+
+        A cell is left out if at none of its places base_link is as far from what is blocked as
+        the inscribed radius. So None is a proof that there is no route; a box promises none.
+        """
+        footprint, size = self.costmap.problem.shape, self.costmap.window.resolution
+        radius = footprint.radius if self.space == "r2" else footprint.inscribed_radius
+        places = self.costmap.clearance + math.sqrt(0.5) * size >= radius
+        if radius > 0.0 or self.space == "r2":  # else base_link may be over what is blocked
+            places &= ~self.costmap.blocked
+        regions, _ = ndimage.label(places, structure=np.ones((3, 3)))
+        first, last = (
+            regions[int(state[1] / size), int(state[0] / size)] for state in (start, goal)
+        )
+        if first == 0 or first != last:
+            return None
+        rows, cols = np.nonzero(regions == first)
+        low, high = size * cols.min(), size * (cols.max() + 1)
+        return float(low), float(size * rows.min()), float(high), float(size * (rows.max() + 1))
+
+    def poses(self, states: Sequence[Pose]) -> Floats:
+        """Return the poses of base_link along a path, shape (n, 2) or (n, 3) [m, map; rad].
+
+        In "r2" these are the states; else they are as dense as the edges were checked.
+        """
+        if self.space == "r2":
+            poses = np.array(states)
+        else:
+            edges = [self._edge(a, b) for a, b in pairwise(states)]
+            poses = np.concatenate([*edges, np.array(states[-1:])])
+        poses[:, :2] += self.costmap.window.origin
+        return poses
+
+    def length(self, states: Sequence[Pose]) -> float:
+        """Return the length of a path [m]."""
+        return float(np.hypot(*np.diff(self.poses(states)[:, :2], axis=0).T).sum())
+
+    def _edge(self, a: Pose, b: Pose) -> Floats:
+        """Return the poses along an edge without its last one."""
+        if self.space == "reeds_shepp" and comes_later(*a, *b):
+            there = _curve(self.body.numbers, self.shape, b, a, forward=False)
+            return there[:0:-1]
+        if self.space not in TURNING:
+            turn = wrap(b[2] - a[2])
+            size = self.costmap.window.resolution
+            steps = slide_steps(self.shape, math.hypot(b[0] - a[0], b[1] - a[1]) / size, turn)
+            change = np.array([b[0] - a[0], b[1] - a[1], turn])
+            slide: Floats = np.array(a) + np.arange(steps)[:, None] / steps * change
+            return slide
+        return _curve(self.body.numbers, self.shape, a, b, forward=self.space == "dubins")[:-1]
+
+
+def _curve(numbers: Floats, shape: Shape, a: Pose, b: Pose, *, forward: bool) -> Floats:
+    """Return the poses along a curve, both ends included."""
+    size = numbers[0]
+    curvatures, lengths = curve_motions(forward, numbers, *a, *b)
+    start = np.array([a[0] / size, a[1] / size, a[2]])
+    poses: Floats = driven(shape, start, curvatures, lengths)
+    poses[:, :2] *= size
+    return poses

@@ -1,0 +1,151 @@
+"""Edges between sampled states: what is called clear is clear all along, and what isn't, isn't."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from groundmap.arrays import Bools, Floats
+from oracles_curves import placed_at
+from oracles_planning import BLOCKED, FREE, grid_of, union_of_squares
+from planners.costmap import Costmap
+from planners.problem import PlanningProblem
+from planners.sampling_settings import Space
+from planners.sampling_ways import Ways
+from strategies import rngs
+
+CAR = [(-0.5, -0.45), (1.5, -0.45), (1.5, 0.45), (-0.5, 0.45)]
+ELL = [(-0.6, -0.6), (0.9, -0.6), (0.9, 0.0), (0.0, 0.0), (0.0, 0.9), (-0.6, 0.9)]
+SIZE, SIDE = 0.5, 24  # [m] of a cell, [cells] of a map
+FINE = 200  # poses that a slow twin looks at along an edge
+
+
+def speckled(rng: np.random.Generator) -> Bools:
+    blocked: Bools = rng.random((SIDE, SIDE)) < rng.choice([0.01, 0.03, 0.1])
+    return blocked
+
+
+def ways_over(blocked: Bools, footprint: Any, space: Space, *, radius: float = 1.0) -> Ways:
+    grid = grid_of(np.where(blocked, BLOCKED, FREE), resolution=SIZE)
+    ends: dict[str, Any] = {"start": (1, 1, 0), "goal": (1, 1, 0)}
+    problem = PlanningProblem(grid, **ends, footprint=footprint, clear_start=False)
+    return Ways(Costmap.of(problem), space, radius)
+
+
+def forbidden(ways: Ways) -> shapely.Geometry:
+    """Return the blocked squares [m, map]."""
+    window = ways.costmap.window
+    squares = union_of_squares(ways.costmap.blocked)
+    return shapely.transform(squares, lambda xy: xy * window.resolution + window.origin)
+
+
+def pose_of(rng: np.random.Generator) -> tuple[float, float, float]:
+    x, y = rng.uniform(1.0, SIZE * SIDE - 1.0, 2).tolist()
+    return x, y, float(rng.uniform(-math.pi, math.pi))
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.3, 1.1])
+@given(rng=rngs())
+@settings(max_examples=40)
+def test_a_line_is_clear_if_and_only_if_the_disc_keeps_its_distance(
+    radius: float, rng: np.random.Generator
+) -> None:
+    ways = ways_over(speckled(rng), radius, "r2")
+    walls = forbidden(ways)
+    for _ in range(20):
+        a, b = pose_of(rng)[:2], pose_of(rng)[:2]
+        away = float(shapely.distance(shapely.LineString([a, b]), walls))
+        assume(abs(away - radius) > 1e-9 or away == 0.0)
+        expected = away >= max(radius, 1e-9)
+        assert ways.is_clear(*ways.state_of(a), *ways.state_of(b)) == expected
+
+
+@pytest.mark.parametrize("footprint", [0.5, CAR, ELL])
+@pytest.mark.parametrize("space", ["se2", "dubins", "reeds_shepp"])
+@given(rng=rngs())
+@settings(max_examples=12)
+def test_an_edge_is_clear_if_what_it_sweeps_is(
+    space: Space, footprint: Any, rng: np.random.Generator
+) -> None:
+    ways = ways_over(speckled(rng), footprint, space)
+    walls = forbidden(ways)
+    shape = ways.costmap.problem.shape
+    outline = shapely.Point(0, 0).buffer(0.5) if shape.is_disc else shapely.Polygon(shape.polygon)
+    for _ in range(6):
+        a, b = (ways.state_of(pose_of(rng)) for _ in range(2))
+        poses = ways.poses([a, b])
+        swept = shapely.union_all([placed_at(outline, pose) for pose in denser(poses)])
+        inside = shapely.buffer(walls, -1e-6, join_style="mitre")
+        outside = shapely.buffer(walls, 0.02)  # a step of a curve is about 1 mm off its chord
+        if ways.is_clear(*a, *b):
+            assert not swept.intersects(inside)
+            assert within_map(ways, poses)
+        elif within_map(ways, poses):
+            assert swept.intersects(outside)
+
+
+def denser(poses: Floats) -> Floats:
+    """Return poses with those half-way between."""
+    turns = np.remainder(np.diff(poses[:, 2]) + np.pi, 2.0 * np.pi) - np.pi
+    steps = np.column_stack([np.diff(poses[:, :2], axis=0), turns])
+    return np.concatenate([poses, poses[:-1] + 0.5 * steps])
+
+
+def within_map(ways: Ways, poses: Floats) -> bool:
+    cells = ways.costmap.to_cells(poses[:, :2])
+    return bool((cells >= 0).all() and (cells < ways.costmap.blocked.shape[0]).all())
+
+
+@pytest.mark.parametrize("space", ["r2", "se2", "reeds_shepp"])
+@given(rng=rngs())
+@settings(max_examples=20)
+def test_the_way_back_is_clear_where_the_way_is(space: Space, rng: np.random.Generator) -> None:
+    ways = ways_over(speckled(rng), CAR if space != "r2" else 0.5, space)
+    for _ in range(10):
+        a, b = (ways.state_of(pose_of(rng)) for _ in range(2))
+        assert ways.is_clear(*a, *b) == ways.is_clear(*b, *a)
+        there, back = ways.poses([a, b]), ways.poses([b, a])
+        np.testing.assert_allclose(back[::-1, :2], there[:, :2], atol=1e-9)
+
+
+@pytest.mark.parametrize("space", ["se2", "dubins", "reeds_shepp"])
+@given(rng=rngs())
+@settings(max_examples=20)
+def test_poses_lead_from_state_to_state_in_steps_of_half_a_cell(
+    space: Space, rng: np.random.Generator
+) -> None:
+    ways = ways_over(np.zeros((SIDE, SIDE), dtype=np.bool_), CAR, space)
+    states = [ways.state_of(pose_of(rng)) for _ in range(4)]
+    poses = ways.poses(states)
+    assert np.hypot(*np.diff(poses[:, :2], axis=0).T).max() <= 0.5 * SIZE + 1e-9
+    for state in states:
+        x, y = state[:2] + ways.costmap.window.origin
+        off = np.hypot(poses[:, 0] - x, poses[:, 1] - y)
+        turn = np.remainder(poses[:, 2] - state[2] + np.pi, 2.0 * np.pi) - np.pi
+        assert (off + np.abs(turn)).min() <= 1e-9
+    assert ways.length(states) > 0.0
+
+
+@given(rng=rngs(), at=st.integers(0, 2**20))
+@settings(max_examples=30)
+def test_what_can_be_reached_lies_in_the_room(rng: np.random.Generator, at: int) -> None:
+    rng = np.random.default_rng(at)
+    ways = ways_over(rng.random((SIDE, SIDE)) < 0.35, 0.2, "r2")
+    states = [ways.state_of(pose_of(rng)[:2]) for _ in range(40)]
+    clear = [state for state in states if ways.is_clear(*state, *state)]
+    assume(len(clear) > 1)
+    for a, b in pairwise(clear):
+        room = ways.room(a, b)
+        if ways.is_clear(*a, *b):
+            assert room is not None
+        if room is not None:
+            for state in (a, b):
+                assert room[0] <= state[0] <= room[2]
+                assert room[1] <= state[1] <= room[3]
