@@ -94,7 +94,8 @@ def plan_many(
     """
     chosen = named(planner)
     options = chosen.settings(**settings)
-    problems = _problems(problem, pairs, headings=chosen.headings)
+    headings = chosen.headings and options.heeds_headings(problem)
+    problems = _problems(problem, pairs, headings=headings)
     workers = min(_threads(threads), max(len(problems), 1))
     if not problems:
         return []

@@ -281,7 +281,7 @@ def test_dear_cells_are_not_weighed(name: str) -> None:
 def test_curved_spaces_need_yaws() -> None:
     asked = problem(start=(2.0, 2.0))
     with pytest.raises(
-        ProblemError, match=r"start: expected x, y \[m\] and yaw \[rad\] for rrt in"
+        ProblemError, match=r"start: expected x, y \[m\] and yaw \[rad\] for rrt, got"
     ):
         plan(asked, "rrt", space="dubins")
 

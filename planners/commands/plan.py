@@ -28,7 +28,7 @@ COLUMNS = ("length", "cost", "bound", "min_clearance", "mean_clearance", "min_co
            "mean_confidence", "expanded", "seconds")  # fmt: skip
 SETTINGS = "; ".join(
     f"{name}: {', '.join(own)}"
-    for name, entry in sorted(PLANNERS.items())
+    for name, entry in sorted(OWN_PLANNERS.items())
     if (own := [key for key in entry.settings.model_fields if key != "time_limit"])
 )
 
