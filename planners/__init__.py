@@ -29,7 +29,7 @@ from planners.polyanya import PolyanyaSettings
 from planners.problem import PlanningProblem
 from planners.registry import OWN_PLANNERS, PLANNERS, plan
 from planners.route import Route
-from planners.sampling_settings import SamplingSettings
+from planners.sampling.settings import SamplingSettings
 from planners.shortcuts import shortcut
 from planners.smoother import max_curvature, smooth
 from planners.theta import LazyThetaSettings, ThetaSettings

@@ -28,9 +28,9 @@ from planners.jps import JPS, JPSPlus, JPSPlusSettings, JPSSettings
 from planners.polyanya import Polyanya, PolyanyaSettings
 from planners.problem import PlanningProblem
 from planners.route import Route
-from planners.sampler import Sampler
-from planners.sampling import samplers
-from planners.sampling_settings import SamplingSettings
+from planners.sampling.door import samplers
+from planners.sampling.sampler import Sampler
+from planners.sampling.settings import SamplingSettings
 from planners.solve import solve
 from planners.theta import LazyTheta, LazyThetaSettings, Theta, ThetaSettings
 from planners.voxels import Voxels

@@ -33,9 +33,10 @@ from planners import (
 )
 from planners.costmap import Costmap
 from planners.engine import Clock
-from planners.sampling import EXACT, REASONS, THREADED, Run, samplers
-from planners.sampling_settings import PARAMETERS, REFUSED, Space, refusal, setter_of
-from planners.sampling_ways import Ways
+from planners.sampling.door import samplers
+from planners.sampling.run import EXACT, REASONS, THREADED, Run
+from planners.sampling.settings import PARAMETERS, REFUSED, Space, refusal, setter_of
+from planners.sampling.ways import Ways
 
 NAMES = sorted(samplers())
 SPACES: tuple[Space, ...] = get_args(Space)

@@ -17,8 +17,8 @@ from oracles_curves import placed_at
 from oracles_planning import BLOCKED, FREE, grid_of, union_of_squares
 from planners.costmap import Costmap
 from planners.problem import PlanningProblem
-from planners.sampling_settings import Space
-from planners.sampling_ways import Ways
+from planners.sampling.settings import Space
+from planners.sampling.ways import Ways
 from strategies import rngs
 
 CAR = [(-0.5, -0.45), (1.5, -0.45), (1.5, 0.45), (-0.5, 0.45)]

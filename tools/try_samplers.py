@@ -1,6 +1,6 @@
 """Try every planner of OMPL in every space, each in a process of its own, to see who crashes.
 
-What is refused by `planners.sampling_settings.REFUSED` is tried all the same. Run it when another
+What is refused by `planners.sampling.settings.REFUSED` is tried all the same. Run it when another
 version of OMPL comes out::
 
     .venv/bin/python tools/try_samplers.py [--seeds 3] [--planner NAME]
@@ -17,8 +17,8 @@ from typing import get_args
 import numpy as np
 
 from groundmap import ConfidenceGrid
-from planners import NoRouteError, PlanningProblem, plan, sampling, sampling_settings
-from planners.sampling_settings import Space
+from planners import NoRouteError, PlanningProblem, plan
+from planners.sampling.settings import Space
 
 SIDE, DOOR = 32, 8  # [cells] of a room, of a door
 CAR = [(-0.5, -0.45), (1.5, -0.45), (1.5, 0.45), (-0.5, 0.45)]
@@ -43,7 +43,7 @@ def rooms() -> ConfidenceGrid:
 
 def child(planner: str, space: str, seed: int) -> None:
     """Plan once, whatever comes, and print what did."""
-    sampling_settings.REFUSED.clear()
+    settings.REFUSED.clear()
     problem = PlanningProblem(
         rooms(),
         start=(3.0, 3.0, 0.5),
@@ -79,13 +79,13 @@ def main() -> None:
     """Print a line for each planner, space and seed."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--planner", choices=sorted(sampling.samplers()))
+    parser.add_argument("--planner", choices=sorted(samplers()))
     parser.add_argument("--child", nargs=3, help=argparse.SUPPRESS)
     told = parser.parse_args()
     if told.child:
         child(told.child[0], told.child[1], int(told.child[2]))
         return
-    for planner in [told.planner] if told.planner else sorted(sampling.samplers()):
+    for planner in [told.planner] if told.planner else sorted(samplers()):
         for space in get_args(Space):
             for seed in range(told.seeds):
                 print(f"{planner:14} {space:12} {seed}: {answer(planner, space, seed)}", flush=True)

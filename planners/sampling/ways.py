@@ -27,7 +27,7 @@ from planners.kernels.sampling import (
     slide_clear,
     slide_steps,
 )
-from planners.sampling_settings import TURNING, Space
+from planners.sampling.settings import TURNING, Space
 
 Bounds: TypeAlias = tuple[float, float, float, float]  # low x, low y, high x, high y [m, corner]
 

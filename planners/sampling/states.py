@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from planners.engine import Pose
-from planners.sampling_settings import SamplingSettings, Space
-from planners.sampling_ways import Bounds, Ways
+from planners.sampling.settings import SamplingSettings, Space
+from planners.sampling.ways import Bounds, Ways
 
 
 def space_of(base: Any, space: Space, room: Bounds, settings: SamplingSettings) -> Any:

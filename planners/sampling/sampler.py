@@ -10,13 +10,13 @@ from contextlib import contextmanager
 import numpy as np
 
 from groundmap.errors import SettingsError
-from planners import sampling_settings
 from planners.costmap import Costmap
 from planners.engine import Clock, Found, Pose, check_uniform
 from planners.errors import ProblemError, TimeLimitError, UnsolvedError
-from planners.sampling import EXACT, REASONS, THREADED, Outcome, Run, has_parameter
-from planners.sampling_settings import SamplingSettings, Space
-from planners.sampling_ways import Ways
+from planners.sampling.door import has_parameter
+from planners.sampling.run import EXACT, REASONS, THREADED, Outcome, Run
+from planners.sampling.settings import SamplingSettings, Space, refusal
+from planners.sampling.ways import Ways
 from planners.wording import Place
 
 _alone = threading.RLock()  # OMPL's random numbers and its log are global
@@ -89,7 +89,7 @@ class Sampler:
         raise self._unsolved(found, settings, clock)
 
     def _check(self, space: Space, settings: SamplingSettings) -> None:
-        reason = sampling_settings.refusal(self.name, space)
+        reason = refusal(self.name, space)
         if reason is not None:
             raise ProblemError("planner", f"one that works in {space!r}", self.name, hint=reason)
         if self.name in THREADED and settings.iterations is not None:

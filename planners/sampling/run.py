@@ -1,4 +1,4 @@
-"""The only door to `ompl`, which the first question opens: its planners' names, and a search.
+"""One search with one of OMPL's planners.
 
 OMPL grows trees and roadmaps; whether a state or an edge is clear is decided by our own kernels,
 an edge in one call. Its answers are taken for what they are: only an exact solution is a path.
@@ -6,28 +6,22 @@ an edge in one call. Its answers are taken for what they are: only an exact solu
 
 from __future__ import annotations
 
-import logging
 import math
-import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
-from contextlib import contextmanager
-from functools import cache
-from importlib.util import find_spec
 from itertools import count
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from planners.engine import Clock, Pose
-from planners.sampling_settings import SamplingSettings, setter_of
-from planners.sampling_states import edge_check, reader, space_of, state_check, state_of
-from planners.sampling_ways import Bounds, Ways
+from planners.sampling.door import logged, ompl, samplers
+from planners.sampling.settings import SamplingSettings, setter_of
+from planners.sampling.states import edge_check, reader, space_of, state_check, state_of
+from planners.sampling.ways import Bounds, Ways
 
-LOG = logging.getLogger(__name__)
 EXACT = "EXACT_SOLUTION"
 # Every other status of OMPL, and what it means to who asked. Starts and goals are checked before.
 REASONS = {
@@ -51,14 +45,6 @@ SAMPLES = 1000  # that planners begin with which take all of their samples at fi
 SAME = 1e-9  # [m, rad] how far OMPL's copy of the goal may be off
 
 
-class Modules(NamedTuple):
-    """OMPL."""
-
-    base: Any
-    geometric: Any
-    util: Any
-
-
 class Outcome(NamedTuple):
     """What OMPL brought back."""
 
@@ -66,25 +52,6 @@ class Outcome(NamedTuple):
     states: list[Pose]  #: the path, if there is one
     left: float | None  #: from its end to the goal, in the space's own distance [m]
     checked: int  #: edges
-
-
-@cache
-def samplers() -> dict[str, str]:
-    """Return the names of the planners that OMPL offers, and of their classes; none without it."""
-    if find_spec("ompl") is None:
-        return {}
-    base, geometric, _ = _ompl()
-    classes = {name: getattr(geometric, name) for name in dir(geometric)}
-    return {
-        name.lower(): name
-        for name, found in classes.items()
-        if isinstance(found, type) and issubclass(found, base.Planner)
-    }
-
-
-def has_parameter(planner: str, name: str) -> bool:
-    """Whether one of OMPL's planners has a parameter."""
-    return hasattr(getattr(_ompl().geometric, samplers()[planner]), setter_of(name))
 
 
 class Run:
@@ -103,11 +70,11 @@ class Run:
         self.name, self.ways, self.ends, self.settings = name, ways, ends, settings
         self.clock, self.edges, self.looks = clock, count(), 0
         self.read = reader(ways.space)
-        self.room, self.ompl = room, _ompl()
+        self.room, self.ompl = room, ompl()
 
     def outcome(self) -> Outcome:
         """Search, and shorten what was found."""
-        with _logged(self.ompl.util):
+        with logged():
             try:
                 return self._outcome()
             except RuntimeError as error:  # what C++ throws arrives as that
@@ -248,35 +215,5 @@ class Run:
         return [start, *states[1:], goal]
 
 
-def _ompl() -> Modules:
-    """Return OMPL, loaded when first asked for."""
-    from ompl import base, geometric, util
-
-    return Modules(base, geometric, util)
-
-
 def _name_of(status: Any) -> str:
     return str(status.getStatus().name)
-
-
-@contextmanager
-def _logged(util: Any) -> Iterator[None]:
-    """Keep OMPL's messages off the console; log them if anybody listens at level DEBUG."""
-    if not LOG.isEnabledFor(logging.DEBUG):
-        util.noOutputHandler()
-        try:
-            yield
-        finally:
-            util.restorePreviousOutputHandler()
-        return
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "log"
-        handler = util.OutputHandlerFile(str(file))  # OMPL holds no reference of its own
-        util.useOutputHandler(handler)
-        try:
-            yield
-        finally:
-            util.restorePreviousOutputHandler()
-            del handler  # closes the file
-            for line in file.read_text(encoding="utf-8", errors="replace").splitlines():
-                LOG.debug("%s", line)

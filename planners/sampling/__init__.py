@@ -1,0 +1,1 @@
+"""Sampling planners: OMPL over the costmap, its edges checked by our own kernels."""
