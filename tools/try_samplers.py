@@ -18,6 +18,8 @@ import numpy as np
 
 from groundmap import ConfidenceGrid
 from planners import NoRouteError, PlanningProblem, plan
+from planners.sampling import settings
+from planners.sampling.door import samplers
 from planners.sampling.settings import Space
 
 SIDE, DOOR = 32, 8  # [cells] of a room, of a door

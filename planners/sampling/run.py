@@ -14,8 +14,6 @@ from concurrent.futures import ThreadPoolExecutor, wait
 from itertools import count
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from planners.engine import Clock, Pose
 from planners.sampling.door import logged, ompl, samplers
 from planners.sampling.settings import SamplingSettings, setter_of
@@ -85,8 +83,7 @@ class Run:
         space = space_of(self.ompl.base, self.ways.space, self.room, self.settings)
         information = self._information(space)
         task = self.ompl.base.ProblemDefinition(information)
-        tolerance = max(self.settings.goal_tolerance, float(np.finfo(np.float64).eps))
-        task.setStartAndGoalStates(*(state_of(space, end) for end in self.ends), tolerance)
+        task.setStartAndGoalStates(*(state_of(space, end) for end in self.ends))
         planner = getattr(self.ompl.geometric, samplers()[self.name])(information)
         for name, value in self.settings.parameters().items():
             getattr(planner, setter_of(name))(value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 from pydantic import Field
@@ -10,14 +11,14 @@ from planners.engine import Pose, SearchSettings
 from planners.footprint import Footprint
 from planners.problem import PlanningProblem
 
-Space = Literal["r2", "se2", "dubins", "reeds_shepp"]
+Space = Literal["r2", "se2", "dubins", "reeds_shepp", "r3"]
 TURNING: tuple[Space, ...] = ("dubins", "reeds_shepp")  # spaces of bounded curvature
 
 
 class SamplingSettings(SearchSettings):
     """What a sampling planner can be told.
 
-    Those up to `goal_tolerance` are for all of them. The others are parameters of single planners,
+    Those up to `keep_graph` are for all of them. The others are parameters of single planners,
     by the names that OMPL's setters have (``range`` is ``setRange``); where none is given, OMPL's
     own value counts, and a planner that has no such parameter refuses it.
     """
@@ -48,11 +49,32 @@ class SamplingSettings(SearchSettings):
     yaw_weight: float = Field(
         0.5, gt=0, le=1000, description="a radian counts as that many metres [m/rad]; se2"
     )
-    goal_tolerance: float = Field(
-        0.0,
-        ge=0,
-        le=1000,
-        description="states that near the goal are joined to it directly [m, weighted yaw added]",
+    goals: tuple[tuple[float, ...], ...] = Field(
+        (),
+        max_length=1000,
+        description="other goals that will do: x, y [m] and, for poses, yaw [rad]",
+    )
+    goal_radius: float = Field(
+        0.0, ge=0, le=1e6, description="places that near to a goal will do [m]"
+    )
+    goal_yaw_tolerance: float = Field(
+        0.0, ge=0, le=math.pi, description="headings that near to a goal's will do [rad]"
+    )
+    length_weight: float = Field(
+        1.0, ge=0, le=1000, description="what a metre costs; the map's costs are added to it [1/m]"
+    )
+    time_weight: float = Field(
+        0.0, ge=0, le=1000, description="what a second costs at max_speed and max_turn_rate [1/s]"
+    )
+    max_speed: float = Field(1.0, gt=0, le=1000, description="of base_link [m/s]")
+    max_turn_rate: float = Field(1.0, gt=0, le=1000, description="of base_link [rad/s]")
+    warm_start: bool = Field(
+        False,
+        description="begin with A*'s route: look only where a better one may be, and return it if"
+        " none is found",
+    )
+    keep_graph: bool = Field(
+        False, description="keep the tree or roadmap that was grown, in the route's `graph`"
     )
 
     range: float | None = Field(None, gt=0, le=1e6, description="longest edge of a tree [m]")
@@ -131,7 +153,7 @@ class SamplingSettings(SearchSettings):
         return {name: getattr(self, name) for name in own}
 
 
-COMMON = 8  # settings before those of single planners, beside the time limit
+COMMON = 16  # settings before those of single planners, beside the time limit
 PARAMETERS: tuple[str, ...] = tuple(SamplingSettings.model_fields)[1 + COMMON :]
 
 
