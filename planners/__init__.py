@@ -6,8 +6,10 @@ from planners.auto import AutoSettings
 from planners.costs import CostSettings
 from planners.dstar_lite import DStarLiteSettings
 from planners.enclosure import widest_route
+from planners.engine import Improvement
 from planners.errors import (
     AuditError,
+    CancelledError,
     EnclosedError,
     NonFreeError,
     NoRouteError,
@@ -40,12 +42,14 @@ __all__ = [
     "AStarSettings",
     "AuditError",
     "AutoSettings",
+    "CancelledError",
     "CostSettings",
     "DStarLiteSettings",
     "DijkstraSettings",
     "EnclosedError",
     "Footprint",
     "HybridAStarSettings",
+    "Improvement",
     "IncrementalPlanner",
     "JPSPlusSettings",
     "JPSSettings",

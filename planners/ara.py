@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from typing import ClassVar, NamedTuple, TypeAlias
+from collections.abc import Iterator
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -12,7 +12,16 @@ from pydantic import Field
 from groundmap.arrays import Floats, Ints
 from planners.costmap import Costmap
 from planners.ends import Ends, ends_of, waypoints_through
-from planners.engine import SLICE, Clock, Found, Pose, SearchSettings
+from planners.engine import (
+    SLICE,
+    Cancel,
+    Clock,
+    Found,
+    Improvement,
+    OnImproved,
+    Pose,
+    SearchSettings,
+)
 from planners.kernels.ara import (
     DONE,
     HEAP_FULL,
@@ -43,16 +52,13 @@ class ARASettings(SearchSettings):
     )
 
 
-class Improvement(NamedTuple):
-    """A route, or a better bound for it, while the search goes on."""
+class _Best(NamedTuple):
+    """The best route so far, and how good it is for sure."""
 
-    cost: float  #: [m], dearer metres counted more
-    bound: float  #: the cost is at most this many times the least
-    seconds: float  #: since the search began [s]
-    waypoints: Floats  #: shape (n, 2) [m, map], start and goal included; not audited
-
-
-OnImproved: TypeAlias = Callable[[Improvement], bool | None]  #: True: that will do
+    cost: float
+    bound: float
+    seconds: float
+    waypoints: Floats
 
 
 class ARA:
@@ -95,6 +101,7 @@ class ARA:
         settings: ARASettings,
         *,
         on_improved: OnImproved | None = None,
+        cancel: Cancel | None = None,
     ) -> Found | None:
         """Return the best route that was found in time, or None if there is none.
 
@@ -106,18 +113,22 @@ class ARA:
         on_improved : callable, optional
             Called with every `Improvement`: costs never rise and bounds fall; the last is what
             `search` returns. If it returns True, the search ends with that route.
+        cancel : Cancel, optional
+            Such as a `threading.Event`: once set, the search ends with the best route so far.
 
         Raises
         ------
         TimeLimitError
             Time ran out before there was a first route; with a limit of 0, always.
+        CancelledError
+            Likewise.
         """
-        clock = Clock(self.name, settings.time_limit)
+        clock = Clock(self.name, settings.time_limit, cancel)
         clock.check(0)
         self.state[EXPANDED] = 0
         best = None
         for best in self._improvements(start, goal, settings, clock):
-            enough = on_improved is not None and on_improved(best)
+            enough = on_improved is not None and on_improved(Improvement(*best))
             if enough or best.bound <= settings.final_bound:
                 break
         if best is None:
@@ -127,16 +138,16 @@ class ARA:
 
     def _improvements(
         self, start: Pose, goal: Pose, settings: ARASettings, clock: Clock
-    ) -> Iterator[Improvement]:
+    ) -> Iterator[_Best]:
         """Yield routes, each with a smaller bound, until one is the best or time is up."""
         ends = ends_of(self.costmap, start, goal)
         if ends.direct:
             waypoints = waypoints_through(self.costmap, start, goal, np.empty((0, 2), int))
-            yield Improvement(length_of(waypoints), 1.0, clock.seconds, waypoints)
+            yield _Best(length_of(waypoints), 1.0, clock.seconds, waypoints)
             return
         self._seed(ends)
         weight, last = _scaled(settings.first_weight), _scaled(settings.final_bound)
-        best: Improvement | None = None
+        best: _Best | None = None
         least, status = 1.0, DONE
         while status == DONE:
             status = self._iterate(ends, weight, clock)
@@ -154,7 +165,7 @@ class ARA:
                 # A shortened end may have made the route before the shorter one.
                 if best is not None and best.cost <= cost:
                     cost, waypoints = best.cost, best.waypoints
-                best = Improvement(cost, bound, clock.seconds, waypoints)
+                best = _Best(cost, bound, clock.seconds, waypoints)
                 yield best
             if weight <= last:
                 return

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import time
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
 
 from pydantic import Field
 
 from groundmap.arrays import Floats
 from groundmap.settings import Settings
 from planners.costmap import Costmap
-from planners.errors import ProblemError, TimeLimitError
+from planners.errors import CancelledError, ProblemError, TimeLimitError
 from planners.problem import PlanningProblem
+
+if TYPE_CHECKING:
+    from planners.sampling.graph import Graph
 
 SLICE = 100_000  # expansions between two looks at the clock: about 20 ms
 
@@ -27,6 +31,11 @@ class SearchSettings(Settings):
         """Whether a planner that knows headings heeds them, told this."""
         return True
 
+    @property
+    def takes_other_goals(self) -> bool:
+        """Whether a route may end elsewhere than at the problem's goal."""
+        return False
+
 
 class Found(NamedTuple):
     """What a planner brings back."""
@@ -36,6 +45,28 @@ class Found(NamedTuple):
     headings: Floats | None = None  #: shape (n,) [rad], where the planner decides on them
     bound: float | None = 1.0  #: the cost is at most this many times the best; None: unbounded
     cost: float | None = None  #: the length [m], dearer metres counted more; None: the length
+    goal: Pose | None = None  #: where it ends, if that is not the problem's goal
+    graph: Graph | None = None  #: the tree or roadmap it was found in, if that was to be kept
+
+
+class Improvement(NamedTuple):
+    """A route, and what is known of it when it is found, while the search goes on."""
+
+    cost: float  #: what the planner minimises: the length [m], dearer metres counted more
+    bound: float | None  #: the cost is at most this many times the least; None: unbounded
+    seconds: float  #: since the search began [s]
+    waypoints: Floats | None  #: shape (n, 2) [m, map], not audited; None: OMPL doesn't tell yet
+
+
+OnImproved: TypeAlias = Callable[[Improvement], bool | None]  #: True: that will do
+
+
+class Cancel(Protocol):
+    """What another thread stops a search with: `threading.Event`, or what looks like one."""
+
+    def is_set(self) -> bool:
+        """Whether the search is to end."""
+        ...
 
 
 class Engine(Protocol):
@@ -84,10 +115,14 @@ class Clock:
     planner : str
         Name for the exception.
     time_limit : float or None [s]
+    cancel : Cancel, optional
+        Once it is set, time is up, too.
     """
 
-    def __init__(self, planner: str, time_limit: float | None) -> None:
-        self.planner, self.time_limit = planner, time_limit
+    def __init__(
+        self, planner: str, time_limit: float | None, cancel: Cancel | None = None
+    ) -> None:
+        self.planner, self.time_limit, self.cancel = planner, time_limit, cancel
         self.began = time.perf_counter()
 
     @property
@@ -97,8 +132,14 @@ class Clock:
 
     @property
     def is_up(self) -> bool:
-        """Whether time has run out."""
-        return self.time_limit is not None and self.seconds >= self.time_limit
+        """Whether time has run out, or somebody wants the search to end."""
+        ran_out = self.time_limit is not None and self.seconds >= self.time_limit
+        return ran_out or self.is_cancelled
+
+    @property
+    def is_cancelled(self) -> bool:
+        """Whether somebody wants the search to end."""
+        return self.cancel is not None and self.cancel.is_set()
 
     def check(self, expanded: int) -> None:
         """Raise if time has run out.
@@ -106,6 +147,10 @@ class Clock:
         Raises
         ------
         TimeLimitError
+        CancelledError
+            Somebody wanted the search to end.
         """
+        if self.is_cancelled:
+            raise CancelledError(self.planner, seconds=self.seconds, expanded=expanded)
         if self.time_limit is not None and self.is_up:
             raise TimeLimitError(self.planner, time_limit=self.time_limit, expanded=expanded)

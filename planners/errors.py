@@ -11,6 +11,7 @@
     │   ├── EnclosedError            start or goal is fenced in
     │   ├── SmoothingError           clearance allows no turns as wide as asked for
     │   ├── TimeLimitError           time ran out before the search ended
+    │   ├── CancelledError           the search was cancelled before there was a route
     │   └── UnsolvedError            a sampling planner ended without a route
     └── AuditError                   a planner's route that keeps not what was asked: a bug
 
@@ -267,6 +268,31 @@ class TimeLimitError(NoRouteError):
         super().__init__(
             f"{planner}: no route within time_limit = {time_limit:g} s "
             f"({expanded} nodes expanded{left_clause(left)}). Allow more time."
+        )
+
+
+class CancelledError(NoRouteError):
+    """The search was cancelled before there was a route.
+
+    Parameters
+    ----------
+    planner : str
+    seconds : float [s]
+        Since the search began.
+    expanded : int
+        Nodes that were expanded; of sampling planners, edges that were checked.
+
+    Examples
+    --------
+    >>> print(CancelledError("rrtstar", seconds=0.25, expanded=480))
+    rrtstar: cancelled after 0.25 s, before there was a route (480 nodes expanded).
+    """
+
+    def __init__(self, planner: str, *, seconds: float, expanded: int) -> None:
+        self.planner, self.seconds, self.expanded = planner, seconds, expanded
+        super().__init__(
+            f"{planner}: cancelled after {seconds:.2f} s, before there was a route "
+            f"({expanded} nodes expanded)."
         )
 
 

@@ -18,7 +18,7 @@ from planners.errors import NoRouteError, ProblemError
 from planners.problem import PlanningProblem
 from planners.registry import Planner, named
 from planners.route import Route
-from planners.solve import solve
+from planners.solve import posed, solve
 
 Pair: TypeAlias = Sequence[Sequence[float] | Floats] | Floats  #: a start and a goal
 
@@ -164,17 +164,10 @@ def _route(desk: _Desk, engine: Engine, problem: PlanningProblem) -> Route:
     began = time.perf_counter()
     check_on_map(problem)
     return solve(
-        _posed(desk.costmap, problem),
+        posed(desk.costmap, problem),
         engine,
         desk.settings,
         began=began,
         headings=desk.headings and desk.settings.heeds_headings(problem),
         audited=desk.audited,
     )
-
-
-def _posed(costmap: Costmap, problem: PlanningProblem) -> Costmap:
-    """Return the costmap of another query, with all that was worked out about the map."""
-    posed = replace(costmap, problem=problem)
-    vars(posed).update(vars(costmap) | {"problem": problem})
-    return posed

@@ -19,9 +19,8 @@ from planners.astar import (
 )
 from planners.astar3d import AStar3D
 from planners.auto import Auto, AutoSettings
-from planners.costmap import Costmap
 from planners.dstar_lite import DStarLite, DStarLiteSettings
-from planners.engine import Engine, SearchSettings
+from planners.engine import Cancel, Engine, OnImproved, SearchSettings
 from planners.errors import ProblemError
 from planners.hybrid import HybridAStar, HybridAStarSettings
 from planners.jps import JPS, JPSPlus, JPSPlusSettings, JPSSettings
@@ -39,11 +38,13 @@ SPATIAL = ("astar", "auto")  # planners that plan on 3-D maps, too
 
 
 class Planner(NamedTuple):
-    """A planner: its engine, the class of its settings, and whether it heeds headings."""
+    """A planner."""
 
-    engine: Callable[[Costmap], Engine]
-    settings: type[SearchSettings]
-    headings: bool = False
+    engine: Callable[..., Engine]  #: made on a `Costmap`; some also on `Voxels`
+    settings: type[SearchSettings]  #: class of its settings
+    headings: bool = False  #: whether it heeds headings
+    anytime: bool = False  #: whether it tells of routes while it searches, and can be cancelled
+    spatial: bool = False  #: whether it can be made on `Voxels`
 
 
 class Planners(MutableMapping[str, Planner]):
@@ -84,14 +85,16 @@ class Planners(MutableMapping[str, Planner]):
 @cache
 def _sampling() -> dict[str, Planner]:
     return {
-        name: Planner(partial(Sampler, name), SamplingSettings, headings=True)
+        name: Planner(
+            partial(Sampler, name), SamplingSettings, headings=True, anytime=True, spatial=True
+        )
         for name in samplers()
     }
 
 
 OWN_PLANNERS: dict[str, Planner] = {
     "astar": Planner(AStar, AStarSettings),
-    "ara": Planner(ARA, ARASettings),
+    "ara": Planner(ARA, ARASettings, anytime=True),
     "auto": Planner(Auto, AutoSettings),
     "dijkstra": Planner(Dijkstra, DijkstraSettings),
     "dstar_lite": Planner(DStarLite, DStarLiteSettings),
@@ -106,7 +109,14 @@ OWN_PLANNERS: dict[str, Planner] = {
 PLANNERS = Planners(dict(OWN_PLANNERS))
 
 
-def plan(problem: PlanningProblem, planner: str = "astar", **settings: Any) -> Route:
+def plan(
+    problem: PlanningProblem,
+    planner: str = "astar",
+    *,
+    on_improved: OnImproved | None = None,
+    cancel: Cancel | None = None,
+    **settings: Any,
+) -> Route:
     """Return a route that the audit passed, or raise an exception that says why there is none.
 
     Parameters
@@ -114,13 +124,20 @@ def plan(problem: PlanningProblem, planner: str = "astar", **settings: Any) -> R
     problem : PlanningProblem
     planner : str, default "astar"
         A name in `PLANNERS`.
+    on_improved : callable, optional
+        Called with an `Improvement` for the first route and every better one, while the search
+        goes on. If it returns True, the search ends with that route. Only "ara" and sampling
+        planners tell.
+    cancel : Cancel, optional
+        Such as a `threading.Event`: once another thread sets it, the search ends, with the best
+        route so far. Only "ara" and sampling planners look at it.
     **settings
         The planner's settings, such as `planners.AStarSettings`.
 
     Raises
     ------
     ProblemError
-        No planner of that name.
+        No planner of that name, or one that can neither tell nor be cancelled.
     SettingsError
         An unknown setting, or one out of its range (from `groundmap.errors`).
     OutsideMapError, NonFreeError, UnknownSpaceError
@@ -129,6 +146,8 @@ def plan(problem: PlanningProblem, planner: str = "astar", **settings: Any) -> R
         No route joins them.
     TimeLimitError
         Time ran out.
+    CancelledError
+        The search was cancelled before there was a route.
     UnsolvedError
         A sampling planner ended without a route.
     AuditError
@@ -147,17 +166,31 @@ def plan(problem: PlanningProblem, planner: str = "astar", **settings: Any) -> R
     began = time.perf_counter()
     entry = named(planner)
     chosen = entry.settings(**settings)
+    watch = _watch(planner, entry, on_improved=on_improved, cancel=cancel)
     check_on_map(problem)
     space = space_of(problem)
-    if isinstance(space, Voxels):
+    if isinstance(space, Voxels) and not entry.spatial:
         return solve(space, _engine_3d(space, planner), chosen, began=began)
     headings = entry.headings and chosen.heeds_headings(problem)
-    return solve(space, entry.engine(space), chosen, began=began, headings=headings)
+    return solve(space, entry.engine(space), chosen, began=began, headings=headings, watch=watch)
+
+
+def _watch(planner: str, entry: Planner, **watch: Any) -> dict[str, Any]:
+    """Return what an anytime planner is to tell of or to look at; others have no such thing."""
+    asked = {name: value for name, value in watch.items() if value is not None}
+    if asked and not entry.anytime:
+        expected = "none, or an anytime planner: 'ara' or a sampling one"
+        raise ProblemError(next(iter(asked)), expected, repr(planner))
+    if "on_improved" in asked and not callable(asked["on_improved"]):
+        raise ProblemError("on_improved", "a callable", repr(asked["on_improved"]))
+    if "cancel" in asked and not callable(getattr(asked["cancel"], "is_set", None)):
+        raise ProblemError("cancel", "a threading.Event", repr(asked["cancel"]))
+    return asked
 
 
 def _engine_3d(space: Voxels, planner: str) -> AStar3D:
     if planner not in SPATIAL:
-        expected = f"one that plans on 3-D maps: {', '.join(SPATIAL)}"
+        expected = f"one that plans on 3-D maps: {', '.join(SPATIAL)}, or a sampling one"
         raise ProblemError("planner", expected, repr(planner))
     return AStar3D(space)
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from os import PathLike
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -21,6 +21,9 @@ from planners.engine import Found
 from planners.polyline import Crossed, crossed, distances_to, length_of
 from planners.problem import PlanningProblem
 from planners.space import Space
+
+if TYPE_CHECKING:
+    from planners.sampling.graph import Graph
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +40,8 @@ class Route:
         (at the goal: the yaw asked for, or along the last piece).
     length : float [m]
     cost : float [m]
-        The length, where the problem says so with dear metres counted more.
+        What the planner minimised: the length, where the problem says so with dear metres counted
+        more; of sampling planners, what their weights say.
     bound : float or None
         The cost is at most this many times the least that the planner could have found; None if
         it knows no bound.
@@ -64,6 +68,9 @@ class Route:
     audit : str
         "clean": a route that the audit refuses is never handed out; "skipped" where
         `planners.plan_many` was told to do without.
+    graph : planners.sampling.graph.Graph or None
+        The tree or roadmap that it was found in, if a sampling planner was told to keep it; files
+        leave it out.
     """
 
     waypoints: Floats
@@ -82,6 +89,7 @@ class Route:
     seconds: float
     frame: str
     audit: str = "clean"
+    graph: Graph | None = None
 
     @classmethod
     def along(cls, space: Space, found: Found, *, planner: str, seconds: float) -> Route:
@@ -117,11 +125,13 @@ class Route:
             expanded=found.expanded,
             seconds=seconds,
             frame=space.problem.grid.frame,
+            graph=found.graph,
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all fields as plain Python values; an infinite clearance as None, as in JSON."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        """Return all fields but the graph as plain values; an infinite clearance as None."""
+        names = [field.name for field in fields(self) if field.name != "graph"]
+        values = {name: getattr(self, name) for name in names}
         values["waypoints"] = self.waypoints.tolist()
         values["headings"] = self.headings.tolist()
         for name in ("min_clearance", "mean_clearance"):

@@ -34,7 +34,9 @@ from planners import (
 from planners.costmap import Costmap
 from planners.engine import Clock
 from planners.sampling.door import samplers
-from planners.sampling.run import EXACT, REASONS, THREADED, Run
+from planners.sampling.objectives import HEEDING, Objective
+from planners.sampling.progress import Progress
+from planners.sampling.run import EXACT, REASONS, THREADED, Run, Task
 from planners.sampling.settings import PARAMETERS, REFUSED, Space, refusal, setter_of
 from planners.sampling.ways import Ways
 
@@ -214,12 +216,27 @@ def test_no_status_of_ompl_is_forgotten() -> None:
 
 @needs_ompl
 def test_what_ompl_throws_becomes_a_reason() -> None:
-    costmap = Costmap.of(problem())
-    ways, told = Ways(costmap, "r2", 1.0), SamplingSettings()
-    ends = ways.state_of((2, 2)), ways.state_of((9, 9))
-    turned = (9.0, 9.0, 1.0, 1.0)
-    run = Run("rrt", ways, room=turned, ends=ends, settings=told, clock=Clock("rrt", 5.0))
-    assert run.outcome().status.startswith("OMPL says: ")
+    ways, told, clock = (
+        Ways(Costmap.of(problem()), "r2", 1.0),
+        SamplingSettings(),
+        Clock("rrt", 5.0),
+    )
+    start, goal = ways.state_of((2, 2)), ways.state_of((9, 9))
+    task = Task(
+        name="rrt",
+        ways=ways,
+        region=ways.region(start),
+        room=(9.0, 9.0, 1.0, 1.0),  # its far corner comes before the near one
+        start=start,
+        goals=[goal],
+        objective=Objective(ways, told),
+        settings=told,
+        clock=clock,
+        progress=Progress(clock, None),
+        first=[],
+        asked=((2, 2), (9, 9)),
+    )
+    assert Run(task).outcome().status.startswith("OMPL says: ")
 
 
 @needs_ompl
@@ -271,11 +288,20 @@ def test_a_wall_all_across_is_proved_to_enclose_at_once() -> None:
             plan(asked, "rrtconnect", space=space, time_limit=None)
 
 
-@pytest.mark.parametrize("name", R2)
-def test_dear_cells_are_not_weighed(name: str) -> None:
+@pytest.mark.parametrize("name", sorted(set(R2) - HEEDING))
+def test_who_heeds_no_costs_says_so(name: str) -> None:
     asked = problem(costs=CostSettings(clearance_weight=1.0))
-    with pytest.raises(ProblemError, match=r"uniform costs, .* Take 'astar'"):
+    with pytest.raises(ProblemError, match="planner: expected one that heeds costs.*: bfmt, bit"):
         plan(asked, name)
+
+
+@pytest.mark.parametrize("name", sorted(HEEDING))
+@needs_ompl
+def test_dear_cells_are_weighed(name: str) -> None:
+    asked = problem(costs=CostSettings(clearance_weight=3.0))
+    route = plan(asked, name, **counted(name))
+    assert route.cost > route.length
+    assert route.mean_clearance > plan(problem(), name, **counted(name)).mean_clearance
 
 
 @needs_ompl

@@ -10,6 +10,8 @@ import typer
 
 from planners.bench.arena import ANY_ANGLE, figures
 from planners.bench.movingai import Result, find_workloads, run
+from planners.bench.worlds import WORKLOADS
+from planners.commands.bench_samplers import Entry, race_samplers
 from planners.console import JsonOption, emit, emit_rows, say, watched
 
 MISMATCH = 1  # exit code
@@ -33,19 +35,99 @@ def planning_command(
         Path | None,
         typer.Option(metavar="DIR", help="Folder with maps and .scen files, or one such file."),
     ] = None,
-    planner: Annotated[str, typer.Option(help="Planner; on voxels, astar.")] = "astar",
+    samplers: Annotated[
+        bool,
+        typer.Option("--samplers", help="Let OMPL's planners compete: who solves what, how soon."),
+    ] = False,
+    planner: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Planner; with --samplers as often as you like, all unless told; with --movingai"
+            " one, astar unless told (on voxels, no other)."
+        ),
+    ] = None,
     limit: Annotated[
         int | None,
         typer.Option(min=1, help="Queries of each file, evenly spread over it; all unless told."),
     ] = None,
+    space: Annotated[
+        list[str] | None,
+        typer.Option(help="With --samplers: r2, se2, dubins, reeds_shepp, r3; all unless told."),
+    ] = None,
+    workload: Annotated[
+        list[str] | None,
+        typer.Option(help=f"With --samplers: {', '.join(WORKLOADS)}; all, or --map, unless told."),
+    ] = None,
+    map_file: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--map", metavar="FILE | DIR", help="With --samplers: maps to cross, as for `plan`."
+        ),
+    ] = None,
+    footprint: Annotated[
+        str | None,
+        typer.Option(
+            metavar="R | 'X,Y X,Y X,Y ...'",
+            help="On --map: radius [m], or corners [m, base_link]; a cart of 0.9 x 0.6 m unless"
+            " told.",
+        ),
+    ] = None,
+    turning_radius: Annotated[
+        float, typer.Option(min=0.01, help="On --map: tightest turn of base_link [m].")
+    ] = 1.0,
+    seeds: Annotated[int, typer.Option(min=1, help="Attempts of each planner at a query.")] = 20,
+    time_limit: Annotated[float, typer.Option(min=0.1, help="Of an attempt [s].")] = 10.0,
+    improve_for: Annotated[
+        float,
+        typer.Option(min=0, help="So long go on planners that better their route [s]."),
+    ] = 1.0,
+    jobs: Annotated[
+        int | None,
+        typer.Option(min=1, help="Processes at a time; as many as processors unless told."),
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(help="With --samplers: draw costs over time: .png, .pdf or .svg."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Put the queries of the MovingAI benchmark to a planner; exit 1 if a length mismatches."""
-    if movingai is None:
+    """Put published queries to a planner (exit 1 if a length mismatches), or let samplers compete.
+
+    With --samplers, planners that are refused somewhere are named with the reason, and routes that
+    are not found count against their planner: exit 0.
+    """
+    if samplers == (movingai is not None):
         raise typer.BadParameter(
-            "expected a folder with maps and queries of the MovingAI benchmark, got none",
+            "expected a folder with maps and queries of the MovingAI benchmark, or --samplers, got"
+            f" {'both' if samplers else 'none'}",
             param_hint="--movingai",
         )
+    if movingai is not None:
+        if len(planner or []) > 1:
+            got = ", ".join(planner or [])
+            raise typer.BadParameter(
+                f"expected one with --movingai, got {got}", param_hint="--planner"
+            )
+        _put_queries(movingai, (planner or ["astar"])[0], limit, as_json=as_json)
+        return
+    entry = Entry(
+        workloads=workload or [],
+        maps=map_file or [],
+        planners=planner or [],
+        spaces=space or [],
+        footprint=footprint,
+        turning_radius=turning_radius,
+        seeds=seeds,
+        time_limit=time_limit,
+        improve_for=improve_for,
+        jobs=jobs,
+        plot=plot,
+    )
+    race_samplers(entry, as_json=as_json)
+
+
+def _put_queries(movingai: Path, planner: str, limit: int | None, *, as_json: bool) -> None:
+    """Put the queries of the MovingAI benchmark to a planner."""
     began = time.perf_counter()
     workloads = find_workloads(movingai, limit=limit)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import typer
@@ -34,12 +35,12 @@ def assignments(texts: list[str]) -> dict[str, Any]:
     Raises
     ------
     typer.BadParameter
-        No equals sign, or a name that comes twice.
+        No equals sign, a name that comes twice, or half a list.
 
     Examples
     --------
-    >>> assignments(["weight=2.5", "motion=dubins", "time_limit=none"])
-    {'weight': 2.5, 'motion': 'dubins', 'time_limit': None}
+    >>> assignments(["weight=2.5", "motion=dubins", "time_limit=none", "goals=[[3, 4]]"])
+    {'weight': 2.5, 'motion': 'dubins', 'time_limit': None, 'goals': [[3, 4]]}
     """
     settings: dict[str, Any] = {}
     for text in texts:
@@ -52,9 +53,21 @@ def assignments(texts: list[str]) -> dict[str, Any]:
     return settings
 
 
+def _listed(text: str) -> Any:
+    """Return a list, as JSON has it."""
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError as error:
+        raise typer.BadParameter(
+            f"expected a list such as [[1, 2], [3, 4]], got {text!r}", param_hint="--set"
+        ) from error
+
+
 def _value(text: str) -> Any:
     if text.lower() == "none":
         return None
+    if text.startswith("["):
+        return _listed(text)
     try:
         return float(text)
     except ValueError:

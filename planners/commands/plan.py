@@ -147,6 +147,7 @@ def plan_command(
             waypoints=route.waypoints,
             footprint=problem.shape.to_value(),
             headings=route.headings,
+            graph=route.graph,
         )
     emit(route.to_dict(), as_json=as_json, title=f"route of {planner} on {map_file}")
 

@@ -18,6 +18,7 @@ from groundmap.errors import FileFormatError, InputError
 from groundmap.io import files_of, load_map
 from planners.commands.settings_file import ConfigOption, read_settings
 from planners.console import JsonOption, emit, numbers
+from planners.sampling.graph import Graph
 
 
 def plot_command(
@@ -81,12 +82,18 @@ def draw_map(
     footprint: float | npt.ArrayLike = 0.0,
     headings: Floats | None = None,
     lines: Mapping[str, Floats] | None = None,
+    graph: Graph | None = None,
 ) -> None:
-    """Draw a map, its trajectory, and a route or several lines with their names into a file."""
+    """Draw a map, its trajectory, and a route or several lines with their names into a file.
+
+    The tree or roadmap that a route was found in lies under it.
+    """
     box = draw.known_bounds(grid) if bounds is None else bounds
     figure, axes = draw.new_figure(box)
     draw.draw_grid(grid, bounds=box, ax=axes)
     draw.draw_trajectory(grid.trajectory, ax=axes)
+    if graph is not None:
+        draw.draw_graph(graph.vertices[:, :2], graph.edges, ax=axes)
     if waypoints is not None:
         draw.draw_route(waypoints, footprint=footprint, headings=headings, ax=axes)
     if lines is not None:

@@ -8,17 +8,31 @@ from __future__ import annotations
 
 import math
 import threading
-import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import dataclass
 from itertools import count
 from typing import Any, NamedTuple
 
+from groundmap.arrays import Bools
 from planners.engine import Clock, Pose
 from planners.sampling.door import logged, ompl, samplers
-from planners.sampling.settings import SamplingSettings, setter_of
-from planners.sampling.states import edge_check, reader, space_of, state_check, state_of
+from planners.sampling.draws import Draws
+from planners.sampling.graph import Graph, graph_of
+from planners.sampling.objectives import Objective
+from planners.sampling.progress import Progress
+from planners.sampling.settings import FLAT, SamplingSettings, setter_of
+from planners.sampling.states import (
+    drawing,
+    edge_check,
+    goal_of,
+    reader,
+    space_of,
+    state_check,
+    state_of,
+)
 from planners.sampling.ways import Bounds, Ways
+from planners.sampling.ways3d import Ways3D
 
 EXACT = "EXACT_SOLUTION"
 # Every other status of OMPL, and what it means to who asked. Starts and goals are checked before.
@@ -38,9 +52,26 @@ THREADED = ("prm", "prmstar")  # they ask from threads of their own whether to s
 # They take no state but by an edge, and the check of an edge is one of its ends, too.
 BY_EDGES = ("informedrrtstar", "kpiece1", "rrt", "rrtconnect", "rrtstar", "sorrtstar")
 GLANCE = 16  # questions whether to stop between two looks at the clock
-SLICE = 0.1  # [s] these are stopped that often, to look whether to
+SLICE = 0.05  # [s] these are stopped that often, to look whether to
 SAMPLES = 1000  # that planners begin with which take all of their samples at first
-SAME = 1e-9  # [m, rad] how far OMPL's copy of the goal may be off
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What one of OMPL's planners is to do."""
+
+    name: str  #: of the planner
+    ways: Ways | Ways3D
+    region: Bools  #: cells to draw samples from
+    room: Bounds  #: box that OMPL samples
+    start: Pose
+    goals: list[Pose]  #: clear states, each of which will do
+    objective: Objective
+    settings: SamplingSettings
+    clock: Clock
+    progress: Progress
+    first: list[Pose]  #: states to draw before any others
+    asked: tuple[Pose, Pose]  #: start and goal as they were given [m, map]
 
 
 class Outcome(NamedTuple):
@@ -50,25 +81,17 @@ class Outcome(NamedTuple):
     states: list[Pose]  #: the path, if there is one
     left: float | None  #: from its end to the goal, in the space's own distance [m]
     checked: int  #: edges
+    graph: Graph | None = None  #: the tree or roadmap, if it was to be kept
 
 
 class Run:
     """One search: OMPL's objects are made for it, and gone after it."""
 
-    def __init__(
-        self,
-        name: str,
-        ways: Ways,
-        *,
-        room: Bounds,
-        ends: tuple[Pose, Pose],
-        settings: SamplingSettings,
-        clock: Clock,
-    ) -> None:
-        self.name, self.ways, self.ends, self.settings = name, ways, ends, settings
-        self.clock, self.edges, self.looks = clock, count(), 0
-        self.read = reader(ways.space)
-        self.room, self.ompl = room, ompl()
+    def __init__(self, task: Task) -> None:
+        self.task, self.ways, self.settings = task, task.ways, task.settings
+        self.clock, self.progress = task.clock, task.progress
+        self.edges, self.looks = count(), 0
+        self.read, self.ompl = reader(task.ways.space), ompl()
 
     def outcome(self) -> Outcome:
         """Search, and shorten what was found."""
@@ -80,28 +103,30 @@ class Run:
 
     def _outcome(self) -> Outcome:
         self.ompl.util.RNG.setSeed(self.settings.seed + 1)  # 0 is refused
-        space = space_of(self.ompl.base, self.ways.space, self.room, self.settings)
+        space = space_of(self.ompl.base, self.ways.space, self.task.room, self.settings)
         information = self._information(space)
-        task = self.ompl.base.ProblemDefinition(information)
-        task.setStartAndGoalStates(*(state_of(space, end) for end in self.ends))
-        planner = getattr(self.ompl.geometric, samplers()[self.name])(information)
-        for name, value in self.settings.parameters().items():
+        definition = self._definition(space, information)
+        planner = getattr(self.ompl.geometric, samplers()[self.task.name])(information)
+        for name, value in self._parameters(planner).items():
             getattr(planner, setter_of(name))(value)
-        planner.setProblemDefinition(task)
+        planner.setProblemDefinition(definition)
         planner.setup()
-        status = self._solved(planner)
-        if not task.hasSolution():
-            return Outcome(status, [], None, self._checked())
-        path = task.getSolutionPath()
+        status = self._solved(planner, definition)
+        graph = None
+        if self.settings.keep_graph:
+            graph = graph_of(self.ompl.base, planner, information, self.ways)
+        if not definition.hasSolution():
+            return Outcome(status, [], None, self._checked(), graph)
         if status != EXACT:
-            return Outcome(status, [], float(task.getSolutionDifference()), self._checked())
-        return self._honest(information, path)
+            left = float(definition.getSolutionDifference())
+            return Outcome(status, [], left, self._checked(), graph)
+        return self._honest(information, definition.getSolutionPath(), graph)
 
     def _information(self, space: Any) -> Any:
-        """Return the space with our own checks of states and edges."""
-        base = self.ompl.base
+        """Return the space with our own checks of states and edges, and our own samples."""
+        base, task = self.ompl.base, self.task
         information = base.SpaceInformation(space)
-        if self.name in BY_EDGES:
+        if task.name in BY_EDGES:
             information.setStateValidityChecker(base.AllValidStateValidityChecker(information))
         else:
             information.setStateValidityChecker(state_check(self.ways))
@@ -109,13 +134,41 @@ class Run:
         check = edge_check(self.ways, self.edges)
         motions = type("Motions", (base.MotionValidator,), {"checkMotion": check})
         information.setMotionValidator(motions(information))
+        draws = Draws(
+            self.ways,
+            task.region,
+            seed=self.settings.seed,
+            yaw_weight=self.settings.yaw_weight,
+            first=task.first,
+        )
+        information.setValidStateSamplerAllocator(drawing(base, draws, self.ways.space))
         information.setup()
         return information
 
-    def _solved(self, planner: Any) -> str:
+    def _definition(self, space: Any, information: Any) -> Any:
+        """Return OMPL's problem: where from, where to, and what is best."""
+        base, kind = self.ompl.base, self.ways.space
+        definition = base.ProblemDefinition(information)
+        definition.addStartState(state_of(space, self.task.start, kind))
+        goals = [state_of(space, goal, kind) for goal in self.task.goals]
+        definition.setGoal(goal_of(base, information, goals))
+        objective = self.task.objective.as_ompl(base, information)
+        definition.setOptimizationObjective(objective)
+        return definition
+
+    def _parameters(self, planner: Any) -> dict[str, float]:
+        """Return the planner's own parameters: what was told, and how far edges reach."""
+        told = self.settings.parameters()
+        if hasattr(planner, "setRange") and "range" not in told:
+            reach = getattr(self.ways, "reach", lambda *a: None)(self.task.region, self.task.room)
+            if reach is not None:
+                return told | {"range": reach}
+        return told
+
+    def _solved(self, planner: Any, definition: Any) -> str:
         """Run a planner until it ends or is to; return its status."""
-        if self.name in THREADED:
-            return self._solved_in_slices(planner)
+        if self.task.name in THREADED:
+            return self._solved_in_slices(planner, definition)
         grows = hasattr(planner, "setNumSamples") and self.settings.num_samples is None
         samples = SAMPLES
         while True:
@@ -128,30 +181,34 @@ class Run:
             samples *= 2
             planner.clear()
 
-    def _solved_in_slices(self, planner: Any) -> str:
+    def _solved_in_slices(self, planner: Any, definition: Any) -> str:
         """Run a planner whose threads no exception may pass through, nor any question to Python.
 
         It is stopped by OMPL's own clock, in a thread that signals don't reach.
         """
         stopped = threading.Event()
+        costs: list[float] = []
 
         def work() -> str:
-            status, solved = "", math.inf
             while True:
                 status = _name_of(planner.solve(SLICE))
                 if status == EXACT:
-                    solved = min(solved, time.perf_counter())
-                improved = time.perf_counter() - solved >= self.settings.improve_for
-                if (status == EXACT and self.name == "prm") or improved:
+                    costs.append(float(definition.getSolutionPath().length()))
+                if (status == EXACT and self.task.name == "prm") or stopped.is_set():
                     return status
-                if self.clock.is_up or stopped.is_set():
+                if self.clock.is_up:
                     return status
 
         with ThreadPoolExecutor(1) as pool:
             try:
                 ending = pool.submit(work)
                 while not wait([ending], timeout=SLICE).done:  # a wait without end hears no signal
-                    pass
+                    for cost in costs:
+                        self.progress.found(cost)
+                    if self.progress.enough or self.progress.has_had(self.settings.improve_for):
+                        stopped.set()
+                for cost in costs:
+                    self.progress.found(cost)
                 return ending.result()
             finally:
                 stopped.set()
@@ -171,45 +228,55 @@ class Run:
         Once yes, always yes: FMT crashes on a change of mind.
         """
         counted = self.settings.iterations is not None
-        betters = hasattr(planner, "bestCost") and not counted
-        first, over = math.inf, False  # when it had a route; whether to stop
+        betters, progress = hasattr(planner, "bestCost"), self.progress
+        over = False
 
         def stop() -> bool:
-            nonlocal first, over
+            nonlocal over
             self.looks += 1
             if not over and (counted or self.looks % GLANCE == 0):
                 over = self._is_over
-                if betters and math.isfinite(planner.bestCost().value()):
-                    first = min(first, time.perf_counter())
-                    over = over or time.perf_counter() - first >= self.settings.improve_for
+                if betters and math.isfinite(cost := planner.bestCost().value()):
+                    progress.found(cost)
+                    bettered = not counted and progress.has_had(self.settings.improve_for)
+                    over = over or progress.enough or bettered
             return over
 
         return stop
 
-    def _honest(self, information: Any, path: Any) -> Outcome:
-        """Return the path, shortened if that made it shorter, all of its edges checked again."""
+    def _honest(self, information: Any, path: Any, graph: Graph | None) -> Outcome:
+        """Return the path, simplified if that made it better, all of its edges checked again."""
         states = self._joined(path)
         if not self.ways.are_clear(states):
             reason = "its path can't be driven"
-            return Outcome(reason, [], None, self._checked())
+            return Outcome(reason, [], None, self._checked(), graph)
+        cost = self.task.objective.cost(states)
+        self.progress.found(cost)
         if self.settings.simplify and len(states) > 2:
             trial = self.ompl.geometric.PathGeometric(path)
             until = self.ompl.base.PlannerTerminationCondition(lambda: self.clock.is_up)
             self.ompl.geometric.PathSimplifier(information).simplify(trial, until)
-            shorter = self._joined(trial)
-            if self.ways.length(shorter) < self.ways.length(states):
-                states = shorter if self.ways.are_clear(shorter) else states
-        return Outcome(EXACT, states, 0.0, self._checked())
+            simpler = self._joined(trial)
+            if self.task.objective.cost(simpler) < cost and self.ways.are_clear(simpler):
+                states = simpler
+        return Outcome(EXACT, states, 0.0, self._checked(), graph)
 
     def _joined(self, path: Any) -> list[Pose]:
         """Return the states of a path, from the very start to the very goal."""
         states = [self.read(state) for state in path.getStates()]
-        start, goal = self.ends
-        x, y, *turn = (float(p - q) for p, q in zip(states[-1], goal, strict=True))
-        off = max(math.hypot(x, y), *(abs(math.remainder(angle, math.tau)) for angle in turn), 0.0)
-        if off <= SAME and len(states) > 1:
+        turns = self.ways.space not in FLAT
+        goal = min(self.task.goals, key=lambda goal: _apart(states[-1], goal, turns=turns))
+        if len(states) > 1:
             states.pop()
-        return [start, *states[1:], goal]
+        return [self.task.start, *states[1:], goal]
+
+
+def _apart(a: Pose, b: Pose, *, turns: bool) -> float:
+    """Return how far two states are apart: only to tell goals from each other."""
+    gaps = [p - q for p, q in zip(a, b, strict=True)]
+    if turns:
+        gaps[2] = math.remainder(gaps[2], math.tau)
+    return math.hypot(*gaps)
 
 
 def _name_of(status: Any) -> str:

@@ -2,24 +2,33 @@
 
 from __future__ import annotations
 
-import math
-import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-
-import numpy as np
+from collections.abc import Sequence
+from dataclasses import replace
 
 from groundmap.errors import SettingsError
+from planners.answers import check_space
 from planners.costmap import Costmap
-from planners.engine import Clock, Found, Pose, check_uniform
-from planners.errors import ProblemError, TimeLimitError, UnsolvedError
+from planners.engine import Cancel, Clock, Found, OnImproved, Pose
+from planners.errors import (
+    CancelledError,
+    NoRouteError,
+    ProblemError,
+    TimeLimitError,
+    UnsolvedError,
+)
 from planners.sampling.door import has_parameter
-from planners.sampling.run import EXACT, REASONS, THREADED, Outcome, Run
-from planners.sampling.settings import SamplingSettings, Space, refusal
-from planners.sampling.ways import Ways
+from planners.sampling.found import found_of
+from planners.sampling.goals import goal_states
+from planners.sampling.objectives import Objective
+from planners.sampling.progress import Progress
+from planners.sampling.run import EXACT, REASONS, THREADED, Outcome, Run, Task
+from planners.sampling.settings import FLAT, SamplingSettings, Space, refusal
+from planners.sampling.turns import turn
+from planners.sampling.warm import better_region, first_states
+from planners.sampling.ways import Ways, box_of
+from planners.sampling.ways3d import Ways3D
+from planners.voxels import Voxels
 from planners.wording import Place
-
-_alone = threading.RLock()  # OMPL's random numbers and its log are global
 
 
 class Sampler:
@@ -29,12 +38,7 @@ class Sampler:
     ----------
     name : str
         As in `samplers`: the class's name in small letters.
-    costmap : Costmap
-
-    Raises
-    ------
-    ProblemError
-        Cells that cost more than others.
+    costmap : Costmap, or Voxels on a 3-D map
 
     Notes
     -----
@@ -46,47 +50,71 @@ class Sampler:
     repeats exactly, unless the time limit ends it; PRM and PRM* run threads, and never do.
     """
 
-    def __init__(self, name: str, costmap: Costmap) -> None:
-        check_uniform(name, costmap)
+    def __init__(self, name: str, costmap: Costmap | Voxels) -> None:
         self.name, self.costmap = name, costmap
-        self._ways: dict[tuple[Space, float], Ways] = {}
+        self._ways: dict[tuple[Space, float], Ways | Ways3D] = {}
 
-    def search(self, start: Pose, goal: Pose, settings: SamplingSettings) -> Found | None:
+    def search(
+        self,
+        start: Pose,
+        goal: Pose,
+        settings: SamplingSettings,
+        *,
+        on_improved: OnImproved | None = None,
+        cancel: Cancel | None = None,
+    ) -> Found | None:
         """Return a route from start to goal, or None if it is proved that there is none.
 
         None is also what a start or a goal gets where the footprint overlaps blocked cells.
 
+        Parameters
+        ----------
+        start, goal : tuple of float
+            x, y [m, map] and, where the space has it, yaw [rad].
+        settings : SamplingSettings
+        on_improved, cancel : optional
+            As in `planners.plan`. Costs are the objective's; the last is that of the route.
+
         Raises
         ------
         ProblemError
-            A space that the planner can't plan in, or a place that lacks a yaw there.
+            A space or an objective that the planner can't plan with, or a place that lacks a yaw.
         SettingsError
             A parameter that the planner doesn't have.
         UnsolvedError
             The planner ended without reaching the goal.
-        TimeLimitError
-            Time ran out; with a limit of 0, always.
+        TimeLimitError, CancelledError
+            Time ran out, or somebody set `cancel`; with a limit of 0, always.
         """
-        clock = Clock(self.name, settings.time_limit)
+        clock = Clock(self.name, settings.time_limit, cancel)
         clock.check(0)
-        space = settings.space_for(self.costmap.problem.shape, start, goal)
-        self._check(space, settings)
-        ways = self._ways_in(space, settings.turning_radius)
-        ends = self._state(ways, "start", start), self._state(ways, "goal", goal)
-        if not all(ways.is_clear(*end, *end) for end in ends):
+        ways = self._ways_for(start, goal, settings)
+        self._check(ways.space, settings)
+        objective = Objective(ways, settings)
+        objective.check(self.name)
+        progress = Progress(clock, on_improved)
+        task = self._task(ways, (start, goal), settings, progress, objective=objective)
+        if task is None:
             return None
-        room = ways.room(*ends)
-        if room is None:
-            return None
-        if ends[0] == ends[1]:
-            return _found(ways, [*ends], start, goal, 0)
-        with _turn(clock):
-            found = Run(
-                self.name, ways, room=room, ends=ends, settings=settings, clock=clock
-            ).outcome()
-        if found.status == EXACT:
-            return _found(ways, found.states, start, goal, found.checked)
-        raise self._unsolved(found, settings, clock)
+        if task.start in task.goals:
+            return self._told(task, [task.start, task.start], 0)
+        if settings.warm_start:
+            return self._bettered(task)
+        return self._found(task, _alone_run(task))
+
+    def _ways_for(self, start: Pose, goal: Pose, settings: SamplingSettings) -> Ways | Ways3D:
+        axes = self.costmap.blocked.ndim
+        if settings.space is not None and (settings.space == "r3") != (axes == 3):
+            expected = "'r3', on a 3-D map" if axes == 3 else "one with two axes, on a 2-D map"
+            raise ProblemError("space", expected, repr(settings.space))
+        space = settings.space_for(self.costmap.problem.shape, start, goal, axes=axes)
+        key = space, settings.turning_radius
+        if key not in self._ways:
+            costmap = self.costmap
+            self._ways[key] = (
+                Ways3D(costmap) if isinstance(costmap, Voxels) else Ways(costmap, *key)
+            )
+        return self._ways[key]
 
     def _check(self, space: Space, settings: SamplingSettings) -> None:
         reason = refusal(self.name, space)
@@ -99,21 +127,81 @@ class Sampler:
             if not has_parameter(self.name, name):
                 raise SettingsError(name, f"a parameter that {self.name!r} has", "another's")
 
-    def _ways_in(self, space: Space, turning_radius: float) -> Ways:
-        key = space, turning_radius
-        if key not in self._ways:
-            self._ways[key] = Ways(self.costmap, *key)
-        return self._ways[key]
+    def _task(
+        self,
+        ways: Ways | Ways3D,
+        asked: tuple[Pose, Pose],
+        settings: SamplingSettings,
+        progress: Progress,
+        *,
+        objective: Objective,
+    ) -> Task | None:
+        """Return what OMPL is to do, or None if there is no route for sure."""
+        start, goal = asked
+        begin = self._state(ways, "start", start)
+        if not settings.takes_other_goals:
+            self._state(ways, "goal", goal)
+        goals = goal_states(ways, settings, goal, settings.seed)
+        if settings.takes_other_goals and not goals:
+            check_space(self.costmap, "goal", goal, headings=ways.space not in FLAT)
+        region = ways.region(begin)
+        goals = [state for state in goals if region[ways.cell_of(state)]]
+        if not (goals and ways.is_clear(*begin, *begin)):
+            return None
+        return Task(
+            name=self.name,
+            ways=ways,
+            region=region,
+            room=box_of(region, self.costmap.window.resolution),
+            start=begin,
+            goals=goals,
+            objective=objective,
+            settings=settings,
+            clock=progress.clock,
+            progress=progress,
+            first=[],
+            asked=asked,
+        )
 
-    def _state(self, ways: Ways, place: Place, pose: Pose) -> Pose:
-        if ways.space != "r2" and len(pose) != 3:
+    def _state(self, ways: Ways | Ways3D, place: Place, pose: Pose) -> Pose:
+        if ways.space not in FLAT and len(pose) != 3:
             expected = f"x, y [m] and yaw [rad] for {self.name} in {ways.space}"
             raise ProblemError(place, expected, str(pose))
         return ways.state_of(pose)
 
-    def _unsolved(
-        self, found: Outcome, settings: SamplingSettings, clock: Clock
-    ) -> TimeLimitError | UnsolvedError:
+    def _bettered(self, task: Task) -> Found:
+        """Return A*'s route, or a better one."""
+        first = first_states(task.ways, *task.asked, task.settings, task.clock)
+        if not first:
+            return self._found(task, _alone_run(task))
+        cost = task.objective.cost(first)
+        task.progress.found(cost, task.ways.poses(first))
+        if task.progress.enough:
+            return self._told(task, first, 0)
+        size = self.costmap.window.resolution
+        longest = task.settings.longest(cost)
+        region = better_region(task.region, size, task.start, task.goals, longest)
+        room = box_of(region, size)
+        found = _alone_run(replace(task, region=region, room=room, first=first))
+        better = found.status == EXACT and task.objective.cost(found.states) < cost
+        states = found.states if better else first
+        return self._told(task, states, found.checked)._replace(graph=found.graph)
+
+    def _found(self, task: Task, outcome: Outcome) -> Found:
+        if outcome.status != EXACT:
+            raise self._unsolved(outcome, task.settings, task.clock)
+        found = self._told(task, outcome.states, outcome.checked)
+        return found._replace(graph=outcome.graph)
+
+    def _told(self, task: Task, states: Sequence[Pose], checked: int) -> Found:
+        cost = task.objective.cost(states)
+        found = found_of(task.ways, states, asked=task.asked, cost=cost, checked=checked)
+        task.progress.ends(cost, found.waypoints)
+        return found
+
+    def _unsolved(self, found: Outcome, settings: SamplingSettings, clock: Clock) -> NoRouteError:
+        if clock.is_cancelled:
+            return CancelledError(self.name, seconds=clock.seconds, expanded=found.checked)
         if clock.is_up and clock.time_limit is not None:
             return TimeLimitError(
                 self.name, time_limit=clock.time_limit, expanded=found.checked, left=found.left
@@ -124,27 +212,7 @@ class Sampler:
         return UnsolvedError(self.name, reason=reason, expanded=found.checked, left=found.left)
 
 
-def _found(ways: Ways, states: Sequence[Pose], start: Pose, goal: Pose, checked: int) -> Found:
-    """Return a path as a route on the map, with start and goal as they were given."""
-    poses = ways.poses(states)
-    if len(poses) == 1:
-        poses = np.concatenate([poses, poses])
-    poses[0, :2], poses[-1, :2] = start[:2], goal[:2]
-    if ways.space == "r2":
-        return Found(poses, checked, bound=None)
-    headings = np.remainder(poses[:, 2] + math.pi, 2.0 * math.pi) - math.pi
-    headings[0], headings[-1] = start[2], goal[2]
-    return Found(np.ascontiguousarray(poses[:, :2]), checked, headings, bound=None)
-
-
-@contextmanager
-def _turn(clock: Clock) -> Iterator[None]:
-    """Wait until no other search runs, or time is up."""
-    left = -1.0 if clock.time_limit is None else max(clock.time_limit - clock.seconds, 0.0)
-    taken = _alone.acquire(timeout=left)
-    try:
-        clock.check(0)
-        yield
-    finally:
-        if taken:
-            _alone.release()
+def _alone_run(task: Task) -> Outcome:
+    """Run a search when no other one runs."""
+    with turn(task.clock):
+        return Run(task).outcome()

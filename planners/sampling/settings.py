@@ -13,6 +13,7 @@ from planners.problem import PlanningProblem
 
 Space = Literal["r2", "se2", "dubins", "reeds_shepp", "r3"]
 TURNING: tuple[Space, ...] = ("dubins", "reeds_shepp")  # spaces of bounded curvature
+FLAT: tuple[Space, ...] = ("r2", "r3")  # spaces without a yaw
 
 
 class SamplingSettings(SearchSettings):
@@ -138,10 +139,22 @@ class SamplingSettings(SearchSettings):
     def heeds_headings(self, problem: PlanningProblem) -> bool:
         """Whether an outline is turned with the robot."""
         start, goal = tuple(map(float, problem.start)), tuple(map(float, problem.goal))
-        return self.space_for(problem.shape, start, goal) != "r2"
+        return self.space_for(problem.shape, start, goal, axes=problem.grid.ndim) not in FLAT
 
-    def space_for(self, footprint: Footprint, start: Pose, goal: Pose) -> Space:
-        """Return the space to plan in."""
+    def longest(self, cost: float) -> float:
+        """Return how long a path is at most that costs so much [m]."""
+        metre = self.length_weight + self.time_weight / self.max_speed
+        return cost / metre if metre > 0 else math.inf
+
+    @property
+    def takes_other_goals(self) -> bool:
+        """Whether a route may end elsewhere than at the problem's goal."""
+        return bool(self.goals) or self.goal_radius > 0 or self.goal_yaw_tolerance > 0
+
+    def space_for(self, footprint: Footprint, start: Pose, goal: Pose, *, axes: int = 2) -> Space:
+        """Return the space to plan in on a map of two axes or three."""
+        if axes == 3:
+            return "r3"
         if self.space is not None:
             return self.space
         turned = len(start) == 3 and len(goal) == 3

@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 from scipy import ndimage
 
-from groundmap.arrays import Floats
+from groundmap.arrays import Bools, Floats
 from planners.costmap import Costmap
 from planners.engine import Pose
 from planners.hybrid_parts import ground_of, shape_of
@@ -29,7 +29,7 @@ from planners.kernels.sampling import (
 )
 from planners.sampling.settings import TURNING, Space
 
-Bounds: TypeAlias = tuple[float, float, float, float]  # low x, low y, high x, high y [m, corner]
+Bounds: TypeAlias = tuple[float, ...]  # low x, low y, high x, high y [m, corner]
 
 
 class Ways:
@@ -94,11 +94,12 @@ class Ways:
         """Whether all edges of a path are clear."""
         return all(self.is_clear(*a, *b) for a, b in pairwise(states))
 
-    def room(self, start: Pose, goal: Pose) -> Bounds | None:
-        """Return a box that holds all that can be reached, or None if the goal can't be.
+    def region(self, start: Pose) -> Bools:
+        """Return the cells that can be reached from a start, shape (rows, cols), and some more.
 
         A cell is left out if at none of its places base_link is as far from what is blocked as
-        the inscribed radius. So None is a proof that there is no route; a box promises none.
+        the inscribed radius. So where a goal lies in no such cell, there is no route; where it
+        does, there may be one.
         """
         footprint, size = self.costmap.problem.shape, self.costmap.window.resolution
         radius = footprint.radius if self.space == "r2" else footprint.inscribed_radius
@@ -106,14 +107,21 @@ class Ways:
         if radius > 0.0 or self.space == "r2":  # else base_link may be over what is blocked
             places &= ~self.costmap.blocked
         regions, _ = ndimage.label(places, structure=np.ones((3, 3)))
-        first, last = (
-            regions[int(state[1] / size), int(state[0] / size)] for state in (start, goal)
+        first = regions[self.cell_of(start)]
+        reached: Bools = (regions == first) & places[self.cell_of(start)]
+        return reached
+
+    def cell_of(self, state: Pose) -> tuple[int, ...]:
+        """Return the cell [row, col] of a state."""
+        size = self.costmap.window.resolution
+        return int(state[1] / size), int(state[0] / size)
+
+    def room(self, start: Pose, goal: Pose) -> Bounds | None:
+        """Return a box that holds all that can be reached, or None if the goal can't be."""
+        region = self.region(start)
+        return (
+            box_of(region, self.costmap.window.resolution) if region[self.cell_of(goal)] else None
         )
-        if first == 0 or first != last:
-            return None
-        rows, cols = np.nonzero(regions == first)
-        low, high = size * cols.min(), size * (cols.max() + 1)
-        return float(low), float(size * rows.min()), float(high), float(size * (rows.max() + 1))
 
     def poses(self, states: Sequence[Pose]) -> Floats:
         """Return the poses of base_link along a path, shape (n, 2) or (n, 3) [m, map; rad].
@@ -145,6 +153,18 @@ class Ways:
             slide: Floats = np.array(a) + np.arange(steps)[:, None] / steps * change
             return slide
         return _curve(self.body.numbers, self.shape, a, b, forward=self.space == "dubins")[:-1]
+
+
+def box_of(region: Bools, size: float) -> Bounds:
+    """Return the box around the cells of a region: low x, y, high x, y [m, corner].
+
+    Examples
+    --------
+    >>> box_of(np.eye(4, dtype=bool)[1:3], 0.5)
+    (0.5, 0.0, 1.5, 1.0)
+    """
+    lows, highs = zip(*((at.min(), at.max() + 1) for at in np.nonzero(region)[::-1]), strict=True)
+    return tuple(size * float(edge) for edge in (*lows, *highs))
 
 
 def _curve(numbers: Floats, shape: Shape, a: Pose, b: Pose, *, forward: bool) -> Floats:

@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeVar
 
 from pydantic import Field
 
-from groundmap.errors import FileFormatError, InputError
+from groundmap.errors import FileFormatError, InputError, SettingsError
 from groundmap.settings import GroundSettings, MapperSettings, Settings
 from groundmap.simulate.drive import DriveSettings
 from groundmap.simulate.parts import HoleSettings, SolidSettings
@@ -35,6 +35,7 @@ Expected = Literal[
     "UnknownSpaceError",
     "EnclosedError",
     "TimeLimitError",
+    "UnsolvedError",
 ]
 
 
@@ -58,6 +59,9 @@ class QuerySettings(Settings):
     unknown: Unknown = Field("avoid", description="unknown and contested space")
     time_limit: float | None = Field(
         None, ge=0, description="search time [s]; the planner's own unless told"
+    )
+    settings: dict[str, Any] = Field(
+        default_factory=dict, description="of the planner, such as seed and iterations"
     )
     max_ratio: float | None = Field(
         None, ge=1, description="of the route's length to that of the best in the true world"
@@ -214,6 +218,10 @@ def _check(query: QuerySettings) -> None:
     if query.planner not in PLANNERS:
         known = ", ".join(sorted(PLANNERS))
         raise InputError("queries.planner", f"one of {known}", repr(query.planner))
+    try:
+        PLANNERS[query.planner].settings(**query.settings)
+    except SettingsError as error:
+        raise InputError(f"queries.settings.{error.name}", error.expected, error.got) from error
     try:
         Footprint.of(query.footprint)
     except ProblemError as error:

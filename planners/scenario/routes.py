@@ -19,7 +19,8 @@ from planners.scenario.simulated import Simulated
 
 FINE = 0.05  # [m], cells of the true world's map
 OUTCOME = "route"  # what is expected where no error is
-IN_TRUTH = {"planner": "astar", "unknown": "avoid", "time_limit": None}  # of the best route
+# Of the best route.
+IN_TRUTH = {"planner": "astar", "settings": {}, "unknown": "avoid", "time_limit": None}
 
 
 class Answer(NamedTuple):
@@ -34,7 +35,9 @@ class Answer(NamedTuple):
 
 def ask(query: QuerySettings, grid: ConfidenceGrid) -> Answer:
     """Plan on a map."""
-    limits = {} if query.time_limit is None else {"time_limit": query.time_limit}
+    told = dict(query.settings)
+    if query.time_limit is not None:
+        told["time_limit"] = query.time_limit
     try:
         problem = PlanningProblem(
             grid,
@@ -43,7 +46,7 @@ def ask(query: QuerySettings, grid: ConfidenceGrid) -> Answer:
             footprint=query.footprint,
             unknown=query.unknown,
         )
-        route = plan(problem, planner=query.planner, **limits)
+        route = plan(problem, query.planner, **told)
     except PlanningError as error:
         name, reason = type(error).__name__, str(error)
         return Answer(query, name, reason, None, {"outcome": name, REASON: reason})

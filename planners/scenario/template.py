@@ -68,6 +68,7 @@ expect = "route"             # or the error: EnclosedError, NonFreeError, Unknow
 # reason = "fenced in"       # what the error's sentence holds: a regular expression
 # unknown = "allow"          # unknown and contested space: avoid, allow or penalise
 # time_limit = 2.0           # search time
+# settings = {{ weight = 1 }}  # of the planner
 max_ratio = 1.1              # to the best route in the true world
 
 [bounds]                     # min, max, or both, for any figure that a run prints

@@ -1,0 +1,69 @@
+"""Pictures of the trees and roadmaps that sampling planners grow, given as plain arrays."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from groundmap.arrays import as_floats
+from groundmap.draw.figure import add_to_legend
+from groundmap.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+
+GRAPH = "#00695c"
+MANY = 5000  # edges from which on they are thinner, and pixels in .pdf and .svg files, too
+
+
+def draw_graph(
+    vertices: npt.ArrayLike, edges: npt.ArrayLike, *, ax: Axes, label: str = "graph"
+) -> list[Artist]:
+    """Draw the edges of a tree or a roadmap, under routes and above the map.
+
+    Edges are drawn as straight lines; those of spaces in which robots drive curves aren't.
+
+    Parameters
+    ----------
+    vertices : array_like, shape (n, 2) or (n, 3) [m, map]
+        Only x and y are looked at.
+    edges : array_like of int, shape (m, 2)
+        Indices of the vertices that an edge joins.
+    ax : matplotlib Axes
+    label : str, default "graph"
+        Name in the legend.
+
+    Raises
+    ------
+    InputError
+        Other shapes, or an edge of a vertex that there is not.
+    """
+    from matplotlib.collections import LineCollection
+    from matplotlib.lines import Line2D
+
+    places = as_floats("vertices", vertices, (None, None))
+    if places.shape[1] < 2 and len(places):
+        raise InputError("vertices", "x and y", f"shape {places.shape}")
+    joined = as_floats("edges", edges, (None, 2)).astype(np.int64)
+    wrong = ((joined < 0) | (joined >= len(places))).any(axis=1)
+    if wrong.any():
+        first = int(wrong.argmax())
+        expected = f"indices of {len(places)} vertices"
+        raise InputError("edges", expected, str(joined[first].tolist()), where=f"row {first}")
+    segments: Any = places[joined][..., :2]
+    many = len(joined) >= MANY
+    lines = LineCollection(
+        segments,
+        colors=GRAPH,
+        linewidths=0.3 if many else 0.5,
+        alpha=0.25 if many else 0.45,
+        zorder=1.5,
+        rasterized=many,
+        label=label,
+    )
+    ax.add_collection(lines, autolim=False)
+    add_to_legend(ax, [Line2D([], [], color=GRAPH, linewidth=1.0, label=label)])
+    return [lines]

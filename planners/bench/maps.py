@@ -1,0 +1,95 @@
+"""Queries on maps that come without any: two places far apart that a way joins."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import ndimage
+
+from groundmap import ConfidenceGrid
+from groundmap.arrays import Floats
+from groundmap.errors import InputError
+from groundmap.io import load_map
+from groundmap.io.load import LOADERS
+from planners.bench.worlds import Case, Cases
+from planners.costmap import Costmap
+from planners.errors import ProblemError
+from planners.footprint import Footprint
+from planners.problem import PlanningProblem
+from planners.voxels import Voxels
+
+TRIES = 64  # places, of which the two are taken that are farthest apart
+SEED = 0  # of the places
+
+
+def find_maps(path: Path) -> list[Path]:
+    """Return a map's file, or those of all maps below a folder.
+
+    Raises
+    ------
+    InputError
+        Nothing of that name, or no map below the folder.
+    """
+    if path.is_file():
+        return [path]
+    if not path.exists():
+        raise InputError(str(path), "a map, or a folder with maps", "nothing of that name")
+    found = sorted(file for file in path.rglob("*") if file.suffix.lower() in LOADERS)
+    if not found:
+        raise InputError(str(path), f"a folder with maps ({', '.join(LOADERS)})", "none")
+    return found
+
+
+def cases_on(map_file: Path, footprint: Any, *, turning_radius: float) -> Cases:
+    """Return the same query on a map in every space that it has.
+
+    Start and goal lie in the largest region that the disc around the footprint can move in; the
+    robot looks from one to the other. In 3-D the footprint is a ball of the disc's radius.
+
+    Raises
+    ------
+    ProblemError
+        The footprint fits nowhere.
+    """
+    grid, shape = load_map(map_file), Footprint.of(footprint)
+    problem = _posed(grid, shape if grid.ndim == 2 else Footprint.of(shape.radius))
+    if grid.ndim == 3:
+        return {"r3": Case(problem, {})}
+    curve = {"turning_radius": turning_radius}
+    return {
+        "r2": Case(problem, {}),
+        "se2": Case(problem, {}),
+        "dubins": Case(problem, curve),
+        "reeds_shepp": Case(problem, curve),
+    }
+
+
+def _posed(grid: ConfidenceGrid, footprint: Footprint) -> PlanningProblem:
+    """Return a problem between two places far apart."""
+    low, high = np.split(grid.bounds(), 2)
+    centre = tuple(((low + high) / 2.0).tolist())
+    blank = PlanningProblem(grid, start=centre, goal=centre, footprint=footprint, clear_start=False)
+    start, goal = _far_apart(Costmap.of(blank) if grid.ndim == 2 else Voxels.of(blank))
+    if grid.ndim == 3:
+        return replace(blank, start=tuple(start), goal=tuple(goal))
+    yaw = math.atan2(*(goal - start)[::-1])
+    return replace(blank, start=(*start, yaw), goal=(*goal, yaw))
+
+
+def _far_apart(space: Costmap | Voxels) -> tuple[Floats, Floats]:
+    """Return the centres of two cells of the largest region of places for the footprint."""
+    regions, count = ndimage.label(space.stand)
+    if count == 0:
+        needed = f"a place for a footprint of radius {space.radius:.2f} m"
+        raise ProblemError("map", needed, "none on the whole of it")
+    largest = 1 + int(np.argmax(np.bincount(regions.ravel())[1:]))
+    cells = np.argwhere(regions == largest)
+    rng = np.random.default_rng(SEED)
+    places = space.window.cell_to_world(cells[rng.integers(len(cells), size=TRIES)])
+    apart = np.linalg.norm(places[:, None] - places, axis=-1)
+    i, j = np.unravel_index(int(np.argmax(apart)), apart.shape)
+    return places[i], places[j]

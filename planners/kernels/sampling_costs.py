@@ -1,0 +1,155 @@
+"""What the edges between sampled states cost: their length, the cells they cross, and their time.
+
+Places come in metres from the map's outer corner, as the sampler holds them. A straight line is cut
+at the borders of the cells, so what its cells cost is exact. A curve is cut into the chords between
+the poses of the route, and the cells count that the chords cross.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from groundmap.arrays import Bytes, Floats
+from planners.kernels.curves import wrap
+from planners.kernels.footprint import Shape
+from planners.kernels.hybrid import driven
+from planners.kernels.sampling import comes_later, curve_motions
+from planners.kernels.shortcut import leg_cost
+
+# What `prices` holds: of a cell's side, of a cell's side per unit of its cost, of the time in which
+# a cell's side is driven at full speed, and of that in which a radian is turned.
+LENGTH, COST, DRIVE, TURN = range(4)
+# What `numbers` begins with, as that of `planners.kernels.sampling.Body`: a cell's side [m], the
+# turning radius, and of the footprint its radius, arm, spike, inscribed radius and bulge [cells].
+SIZE, TURNING_RADIUS, RADIUS, ARM, SPIKE, INSCRIBED, BULGE = range(7)
+
+
+@njit(cache=True, nogil=True)
+def line_cost(
+    costs: Bytes, numbers: Floats, prices: Floats, ax: float, ay: float, bx: float, by: float
+) -> float:
+    """Return what the straight line from a to b costs.
+
+    Parameters
+    ----------
+    costs : ndarray of uint8, shape (rows, cols)
+        Of cells, 252 at most.
+    numbers : ndarray, shape (7,)
+        As in `Body`.
+    prices : ndarray, shape (4,)
+    ax, ay, bx, by : float [m]
+    """
+    size = numbers[SIZE]
+    ax, ay, bx, by = ax / size, ay / size, bx / size, by / size
+    total: float = (prices[LENGTH] + prices[DRIVE]) * math.hypot(bx - ax, by - ay)
+    if prices[COST] > 0.0:
+        total += prices[COST] * leg_cost(costs, ax, ay, bx, by)
+    return total
+
+
+@njit(cache=True, nogil=True)
+def slide_cost(
+    costs: Bytes,
+    numbers: Floats,
+    prices: Floats,
+    ax: float,
+    ay: float,
+    a: float,
+    bx: float,
+    by: float,
+    b: float,
+) -> float:
+    """Return what it costs to move straight from a to b, and to turn meanwhile.
+
+    Driving and turning end at once: the slower of the two tells how long that takes.
+
+    Parameters
+    ----------
+    costs, numbers, prices
+        As for `line_cost`.
+    ax, ay, a, bx, by, b : float [m, rad]
+    """
+    size = numbers[SIZE]
+    ax, ay, bx, by = ax / size, ay / size, bx / size, by / size
+    length = math.hypot(bx - ax, by - ay)
+    total: float = prices[LENGTH] * length
+    total += max(prices[DRIVE] * length, prices[TURN] * abs(wrap(b - a)))
+    if prices[COST] > 0.0:
+        total += prices[COST] * leg_cost(costs, ax, ay, bx, by)
+    return total
+
+
+@njit(cache=True, nogil=True)
+def curve_cost(
+    forward: bool,
+    costs: Bytes,
+    numbers: Floats,
+    prices: Floats,
+    ax: float,
+    ay: float,
+    a: float,
+    bx: float,
+    by: float,
+    b: float,
+) -> float:
+    """Return what the shortest curve from a to b costs.
+
+    Parameters
+    ----------
+    forward : bool
+        Dubins' curve; otherwise that of Reeds and Shepp, which costs the same both ways.
+    costs, numbers, prices
+        As for `line_cost`.
+    ax, ay, a, bx, by, b : float [m, rad]
+    """
+    if not forward and comes_later(ax, ay, a, bx, by, b):
+        ax, ay, a, bx, by, b = bx, by, b, ax, ay, a
+    curvatures, lengths = curve_motions(forward, numbers, ax, ay, a, bx, by, b)
+    total = 0.0
+    for i in range(len(lengths)):
+        length = abs(lengths[i])
+        total += max(prices[DRIVE] * length, prices[TURN] * abs(curvatures[i]) * length)
+    start = np.array([ax / numbers[SIZE], ay / numbers[SIZE], a])
+    poses = driven(_shape(numbers), start, curvatures, lengths)
+    for j in range(1, len(poses)):
+        from_x, from_y, to_x, to_y = poses[j - 1, 0], poses[j - 1, 1], poses[j, 0], poses[j, 1]
+        total += prices[LENGTH] * math.hypot(to_x - from_x, to_y - from_y)
+        if prices[COST] > 0.0:
+            total += prices[COST] * leg_cost(costs, from_x, from_y, to_x, to_y)
+    return total
+
+
+@njit(cache=True, nogil=True)
+def curve_length(
+    forward: bool,
+    numbers: Floats,
+    ax: float,
+    ay: float,
+    a: float,
+    bx: float,
+    by: float,
+    b: float,
+) -> float:
+    """Return the length of the shortest curve from a to b, along its arcs [m]."""
+    if not forward and comes_later(ax, ay, a, bx, by, b):
+        ax, ay, a, bx, by, b = bx, by, b, ax, ay, a
+    _, lengths = curve_motions(forward, numbers, ax, ay, a, bx, by, b)
+    return float(numbers[SIZE] * np.abs(lengths).sum())
+
+
+@njit(cache=True, nogil=True)
+def _shape(numbers: Floats) -> Shape:
+    """Return what of a footprint decides how finely a curve is cut."""
+    return Shape(
+        np.empty((0, 2)),
+        np.empty(0, dtype=np.int64),
+        np.empty((0, 3)),
+        numbers[RADIUS],
+        numbers[ARM],
+        numbers[SPIKE],
+        numbers[INSCRIBED],
+        numbers[BULGE],
+    )

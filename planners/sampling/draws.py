@@ -1,0 +1,97 @@
+"""Clear states at random: drawn from the cells that can be reached, so narrow maps don't starve."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from groundmap.arrays import Bools
+from planners.engine import Pose
+from planners.sampling.settings import FLAT
+from planners.sampling.ways import Ways
+from planners.sampling.ways3d import Ways3D
+
+BATCH = 1024  # states drawn at once
+TRIES = 50  # for one that is clear
+
+
+class Draws:
+    """Clear states of a space, one after another.
+
+    Parameters
+    ----------
+    ways : Ways
+    region : ndarray of bool, shape (rows, cols)
+        Cells to draw from; on voxels of shape (layers, rows, cols).
+    seed : int
+    yaw_weight : float [m/rad]
+        How far away a turn is, for states near another.
+    first : iterable of states
+        Handed out before any others.
+
+    Examples
+    --------
+    >>> from groundmap import ConfidenceGrid
+    >>> from planners.costmap import Costmap
+    >>> from planners.problem import PlanningProblem
+    >>> grid = ConfidenceGrid(resolution=0.5)
+    >>> field = np.full((64, 64), 1.0, dtype=np.float32)
+    >>> field[20:24] = -1.0
+    >>> grid.fuse(np.array([0, 0]), field)
+    >>> problem = PlanningProblem(grid, start=(2, 11), goal=(30, 11), footprint=0.9)
+    >>> ways = Ways(Costmap.of(problem), "r2", 1.0)
+    >>> start = ways.state_of((2, 11))
+    >>> draws = Draws(ways, ways.region(start), seed=0)
+    >>> all(ways.is_clear(*2 * draws.anywhere()) for _ in range(100))
+    True
+    """
+
+    def __init__(
+        self,
+        ways: Ways | Ways3D,
+        region: Bools,
+        *,
+        seed: int,
+        yaw_weight: float = 1.0,
+        first: Iterable[Pose] = (),
+    ) -> None:
+        self.ways, self.size = ways, ways.costmap.window.resolution
+        self.cells = np.argwhere(region)[:, ::-1]  # x, y (, z)
+        self.random = np.random.default_rng(seed)
+        self.yaw_weight = yaw_weight
+        self._first = iter(tuple(first))
+        self._others = self._drawn()
+
+    def anywhere(self) -> Pose | None:
+        """Return a clear state, or None if none was found."""
+        state = next(self._first, None)
+        if state is not None:
+            return state
+        return next(filter(self._is_clear, (next(self._others) for _ in range(TRIES))), None)
+
+    def near(self, state: Pose, distance: float) -> Pose | None:
+        """Return a clear state in the box of half a side `distance` [m] around another, or None."""
+        reach = np.full(len(state), distance)
+        if self.ways.space not in FLAT:
+            reach[2] = min(distance / self.yaw_weight, math.pi)
+        offsets = self.random.uniform(-1.0, 1.0, (TRIES, len(state))) * reach
+        for near in (np.array(state) + offsets).tolist():
+            if self._is_clear(tuple(near)):
+                return tuple(near)
+        return None
+
+    def _is_clear(self, state: Pose) -> bool:
+        return self.ways.is_clear(*state, *state)
+
+    def _drawn(self) -> Iterator[Pose]:
+        """Yield states in the cells of the region, evenly, and any yaw; clear or not."""
+        axes = self.cells.shape[1]
+        while True:
+            cells = self.cells[self.random.integers(len(self.cells), size=BATCH)]
+            states = (cells + self.random.random((BATCH, axes))) * self.size
+            if self.ways.space not in FLAT:
+                yaws = self.random.uniform(-math.pi, math.pi, BATCH)
+                states = np.column_stack([states, yaws])
+            yield from map(tuple, states.tolist())

@@ -1,0 +1,166 @@
+"""Where a search may end: the goal, other goals that will do, and what is near enough to them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import chain
+
+import numpy as np
+
+from groundmap.arrays import Bools, Floats
+from groundmap.errors import SettingsError
+from planners.engine import Pose
+from planners.errors import ProblemError
+from planners.sampling.settings import FLAT, SamplingSettings
+from planners.sampling.ways import Ways
+from planners.sampling.ways3d import Ways3D
+
+SAMPLES = 64  # of what is near enough to the goals, altogether
+LEAST = 4  # and for each of them
+TRIES = 1024  # at either way to find those of one goal
+
+
+def goal_states(
+    ways: Ways | Ways3D, settings: SamplingSettings, goal: Pose, seed: int
+) -> list[Pose]:
+    """Return the clear states in which a route may end; none if there is none.
+
+    First come the goals themselves, then samples of what is near enough to them, nearest first.
+    Samples are drawn evenly from the disc (in 3-D the ball) of ``goal_radius`` and from the
+    headings within ``goal_yaw_tolerance``. Where most of these are not clear, the centres of cells
+    are tried as well, so a pocket of free cells is not missed.
+
+    Parameters
+    ----------
+    ways : Ways or Ways3D
+    settings : SamplingSettings
+    goal : tuple of float
+        x, y (in 3-D: x, y, z) [m, map] and, where the space has it, yaw [rad]. Where any heading
+        will do, it needs no yaw.
+    seed : int
+
+    Returns
+    -------
+    list of states [m, corner; rad]
+
+    Raises
+    ------
+    ProblemError
+        A goal that lacks a yaw.
+    SettingsError
+        One of ``settings.goals`` that is not of so many numbers.
+
+    Examples
+    --------
+    >>> from groundmap import ConfidenceGrid
+    >>> from planners.costmap import Costmap
+    >>> from planners.problem import PlanningProblem
+    >>> grid = ConfidenceGrid(resolution=0.5)
+    >>> grid.fuse(np.array([0, 0]), np.full((64, 64), -1.0, dtype=np.float32))
+    >>> problem = PlanningProblem(grid, start=(2, 2), goal=(9, 9), footprint=0.9)
+    >>> ways = Ways(Costmap.of(problem), "r2", 1.0)
+    >>> states = goal_states(ways, SamplingSettings(goal_radius=0.5), (9, 9), seed=0)
+    >>> states[0] == ways.state_of((9, 9)), len(states)
+    (True, 65)
+    >>> max(math.dist(states[0], state) for state in states) <= 0.5
+    True
+    """
+    goals = _checked(ways, settings, goal)
+    axes = _axes(ways)
+    turns = ways.space not in FLAT
+    exact = [
+        state
+        for place in goals
+        if not turns or len(place) > axes
+        for state in [ways.state_of(place)]
+        if ways.is_clear(*state, *state)
+    ]
+    if settings.goal_radius == 0.0 and not (turns and settings.goal_yaw_tolerance > 0.0):
+        return exact
+    count = max(SAMPLES // len(goals), LEAST)
+    samples = [
+        sample
+        for number, place in enumerate(goals)
+        for sample in _samples(ways, settings, place, np.random.default_rng([seed, number]), count)
+    ]
+    return [*exact, *(state for _, state in sorted(samples))]
+
+
+def _checked(ways: Ways | Ways3D, settings: SamplingSettings, goal: Pose) -> list[Pose]:
+    """Return all goals, each of as many numbers as the space asks for."""
+    axes = _axes(ways)
+    anyhow = ways.space in FLAT or settings.goal_yaw_tolerance >= math.pi
+    counts = (axes, axes + 1) if anyhow else (axes + 1,)
+    expected = f"{', '.join('xyz'[:axes])} [m] and {'optionally ' if anyhow else ''}yaw [rad]"
+    if len(goal) not in counts:
+        raise ProblemError("goal", f"{expected} in {ways.space}", str(goal))
+    for number, other in enumerate(settings.goals):
+        if len(other) not in counts:
+            raise SettingsError(f"goals[{number}]", f"{expected} in {ways.space}", str(other))
+    return [goal, *settings.goals]
+
+
+def _samples(
+    ways: Ways | Ways3D,
+    settings: SamplingSettings,
+    goal: Pose,
+    rng: np.random.Generator,
+    count: int,
+) -> list[tuple[float, Pose]]:
+    """Return clear states near enough to one goal, each after its distance to it."""
+    found: list[tuple[float, Pose]] = []
+    axes = _axes(ways)
+    centre, yaw = goal[:axes], goal[axes:]
+    for place in chain(_disc(settings, centre, rng), _centres(ways, settings, centre, rng)):
+        turn = 0.0
+        pose = place
+        if ways.space not in FLAT:
+            turn = float(rng.uniform(-1.0, 1.0)) * (settings.goal_yaw_tolerance if yaw else math.pi)
+            pose = (*place, (yaw[0] if yaw else 0.0) + turn)
+        state = ways.state_of(pose)
+        if ways.is_clear(*state, *state):
+            away = math.dist(place, centre) + settings.yaw_weight * (abs(turn) if yaw else 0.0)
+            found.append((away, state))
+            if len(found) == count:
+                break
+    return found
+
+
+def _disc(settings: SamplingSettings, centre: Pose, rng: np.random.Generator) -> Iterator[Pose]:
+    """Yield places, evenly over the disc or ball around a goal [map]."""
+    axes = len(centre)
+    directions = rng.normal(size=(TRIES, axes))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    radii = settings.goal_radius * rng.random((TRIES, 1)) ** (1.0 / axes)
+    yield from map(tuple, (np.array(centre) + radii * directions).tolist())
+
+
+def _centres(
+    ways: Ways | Ways3D, settings: SamplingSettings, centre: Pose, rng: np.random.Generator
+) -> Iterator[Pose]:
+    """Yield centres of cells near enough to a goal where the footprint may fit [map], shuffled."""
+    window, radius = ways.costmap.window, settings.goal_radius
+    if radius == 0.0:
+        return
+    places = _places(ways)
+    box = [ways.costmap.to_cells(np.array(centre) + side)[0, ::-1] for side in (-radius, radius)]
+    low, high = np.clip(np.floor(box), 0, np.array(places.shape) - 1).astype(np.int64)
+    part = tuple(map(slice, low.tolist(), (high + 1).tolist()))
+    centres: Floats = window.cell_to_world(np.argwhere(places[part]) + low)
+    near = centres[np.linalg.norm(centres - centre, axis=1) <= radius]
+    yield from map(tuple, rng.permutation(near)[:TRIES].tolist())
+
+
+def _places(ways: Ways | Ways3D) -> Bools:
+    """Return the cells on whose centre base_link may be, and with a yaw some more."""
+    if isinstance(ways, Ways3D) or ways.space in FLAT:
+        return ways.costmap.stand
+    costmap, radius = ways.costmap, ways.costmap.problem.shape.inscribed_radius
+    if radius == 0.0:  # base_link may be over what is blocked
+        return np.ones_like(costmap.blocked)
+    return ~costmap.blocked & (costmap.clearance >= radius - costmap.window.resolution)
+
+
+def _axes(ways: Ways | Ways3D) -> int:
+    return 3 if ways.space == "r3" else 2

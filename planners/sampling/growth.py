@@ -1,0 +1,68 @@
+"""Roadmaps grown by OMPL's PRM and PRM*, without a query."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import count
+
+from groundmap.arrays import Bools
+from planners.engine import Clock
+from planners.sampling.door import logged, ompl, samplers
+from planners.sampling.draws import Draws
+from planners.sampling.graph import Graph, graph_of
+from planners.sampling.settings import SamplingSettings
+from planners.sampling.states import drawing, edge_check, space_of
+from planners.sampling.turns import turn
+from planners.sampling.ways import Ways, box_of
+
+
+def grown(
+    planner: str, ways: Ways, region: Bools, settings: SamplingSettings, clock: Clock
+) -> Graph:
+    """Return a roadmap.
+
+    Parameters
+    ----------
+    planner : {"prm", "prmstar"}
+    ways : Ways
+    region : ndarray of bool, shape (rows, cols)
+        Cells to draw samples from.
+    settings : SamplingSettings
+    clock : Clock
+        It grows until time is up, or until ``settings.iterations`` are used up.
+    """
+    base, geometric, util = ompl()
+    with turn(clock), logged():
+        util.RNG.setSeed(settings.seed + 1)  # 0 is refused
+        box = box_of(region, ways.costmap.window.resolution)
+        information = base.SpaceInformation(space_of(base, ways.space, box, settings))
+        # Only clear states are drawn.
+        information.setStateValidityChecker(base.AllValidStateValidityChecker(information))
+        # The class is made here: one that outlives the growth is reported as a leak at exit.
+        check = edge_check(ways, count())
+        motions = type("Motions", (base.MotionValidator,), {"checkMotion": check})
+        information.setMotionValidator(motions(information))
+        draws = Draws(ways, region, seed=settings.seed, yaw_weight=settings.yaw_weight)
+        information.setValidStateSamplerAllocator(drawing(base, draws, ways.space))
+        information.setup()
+        prm = getattr(geometric, samplers()[planner])(information)
+        if settings.max_nearest_neighbors is not None:
+            prm.setMaxNearestNeighbors(settings.max_nearest_neighbors)
+        prm.setProblemDefinition(base.ProblemDefinition(information))  # it crashes without one
+        prm.setup()
+        # Growing alone runs no threads, so the question whether to stop may be Python's.
+        stop = _stop(settings, clock)
+        prm.growRoadmapPtc(base.PlannerTerminationCondition(stop))
+        return graph_of(base, prm, information, ways)
+
+
+def _stop(settings: SamplingSettings, clock: Clock) -> Callable[[], bool]:
+    looks, over = count(1), False
+
+    def stop() -> bool:
+        nonlocal over
+        used_up = settings.iterations is not None and next(looks) >= settings.iterations
+        over = over or used_up or clock.is_up
+        return over
+
+    return stop

@@ -1,0 +1,112 @@
+"""Files of roadmaps: arrays and JSON, and a digest of the map that they were grown over."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import replace
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from groundmap.archive import read_archive, write_archive
+from groundmap.errors import FileFormatError
+from planners.costmap import Costmap
+from planners.problem import PlanningProblem
+from planners.sampling.graph import Graph
+from planners.sampling.settings import SamplingSettings
+
+FORMAT, VERSION = "groundmap roadmap", 1
+
+
+def write_roadmap(
+    path: str | PathLike[str], graph: Graph, costmap: Costmap, settings: Mapping[str, Any]
+) -> None:
+    """Write a roadmap, all or nothing.
+
+    Parameters
+    ----------
+    path : path-like
+    graph : Graph
+    costmap : Costmap
+        That it was grown over.
+    settings : mapping
+        Those that were given, its space among them.
+    """
+    header = {
+        "format": FORMAT,
+        "version": VERSION,
+        "settings": dict(settings),
+        "cleared_at": list(costmap.problem.clear_place),
+        "ground": _digest(costmap),
+    }
+    arrays = {"vertices": graph.vertices, "edges": graph.edges, "weights": graph.weights}
+    write_archive(path, header, arrays)
+
+
+def read_roadmap(
+    path: str | PathLike[str], problem: PlanningProblem
+) -> tuple[Graph, Costmap, SamplingSettings]:
+    """Return a roadmap, the costmap that it was grown over, and its settings.
+
+    Parameters
+    ----------
+    path : path-like
+    problem : PlanningProblem
+        Start and goal don't matter.
+
+    Raises
+    ------
+    FileFormatError
+        No roadmap, or one of another map or footprint.
+    """
+    header, arrays = read_archive(path, FORMAT, VERSION)
+    try:
+        place, ground = tuple(map(float, header["cleared_at"])), header["ground"]
+        graph = Graph(arrays["vertices"], arrays["edges"], arrays["weights"])
+        settings = SamplingSettings(**header["settings"])
+        whole = _fits(graph, width=2 if settings.space == "r2" else 3)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise FileFormatError(path, "a whole roadmap", "one that lacks something") from error
+    if not whole:
+        raise FileFormatError(path, "a whole roadmap", "arrays that don't fit each other")
+    cleared = place if problem.cleared_at is None else problem.cleared_at
+    costmap = Costmap.of(replace(problem, start=place, goal=place, cleared_at=cleared))
+    if _digest(costmap) != ground:
+        raise FileFormatError(
+            path,
+            "a roadmap of this map and footprint",
+            "one that was grown over other free cells or for another footprint",
+            hint="Grow another one.",
+        )
+    return graph, costmap, settings
+
+
+def _fits(graph: Graph, *, width: int) -> bool:
+    """Whether the arrays of a file are those of a graph."""
+    vertices, edges, weights = graph.vertices, graph.edges, graph.weights
+    return (
+        vertices.shape == (len(vertices), width)
+        and edges.shape == (len(edges), 2)
+        and weights.shape == (len(edges),)
+        and vertices.dtype == weights.dtype == np.float64
+        and edges.dtype == np.int64
+        and bool(np.isfinite(vertices).all())
+        and bool(((edges >= 0) & (edges < len(vertices))).all())
+    )
+
+
+def _digest(costmap: Costmap) -> str:
+    """Return a digest of what a roadmap depends on: the free cells, and the footprint.
+
+    What is blocked anyway does not matter, so it is the same however wide the window is.
+    """
+    grid, shape = costmap.problem.grid, costmap.problem.shape
+    cells = np.argwhere(~costmap.blocked) + costmap.lower_cell
+    polygon = np.empty((0, 2)) if shape.polygon is None else shape.polygon
+    numbers = np.array([grid.resolution, *grid.origin, shape.radius, len(polygon)])
+    digest = hashlib.sha256()
+    for values in (numbers, polygon, cells):
+        digest.update(np.ascontiguousarray(values).tobytes())
+    return digest.hexdigest()

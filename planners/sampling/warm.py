@@ -1,0 +1,110 @@
+"""A route to begin with, and where a better one may be."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from groundmap.arrays import Bools, Floats
+from planners.astar import AStar, AStarSettings
+from planners.astar3d import AStar3D
+from planners.engine import Clock, Found, Pose, SearchSettings
+from planners.errors import TimeLimitError
+from planners.hybrid import HybridAStar, HybridAStarSettings
+from planners.kernels.curves import wrap
+from planners.sampling.settings import TURNING, SamplingSettings
+from planners.sampling.ways import Ways
+from planners.sampling.ways3d import Ways3D
+from planners.voxels import Voxels
+
+
+def first_states(
+    ways: Ways | Ways3D, start: Pose, goal: Pose, settings: SamplingSettings, clock: Clock
+) -> list[Pose]:
+    """Return the states of A*'s route (in curved spaces, hybrid A*'s), or none if it has none.
+
+    A* moves a disc that holds the footprint at every heading, so in se2 the yaw changes evenly
+    along its route.
+
+    Parameters
+    ----------
+    ways : Ways
+    start, goal : tuple of float
+        x, y [m, map] and, where the space has it, yaw [rad].
+    settings : SamplingSettings
+    clock : Clock
+        Of the whole search.
+    """
+    left = None if clock.time_limit is None else max(clock.time_limit - clock.seconds, 0.0)
+    try:
+        found = _searched(ways, start, goal, settings, left)
+    except TimeLimitError:
+        return []
+    if found is None:
+        return []
+    if ways.space == "se2":
+        poses = _turned(found.waypoints, start[2], goal[2])
+    elif ways.space in TURNING:
+        assert found.headings is not None
+        poses = np.column_stack([found.waypoints, found.headings])
+    else:
+        poses = found.waypoints
+    states = [ways.state_of(tuple(pose)) for pose in poses.tolist()]
+    return states if ways.are_clear(states) else []
+
+
+def _searched(
+    ways: Ways | Ways3D, start: Pose, goal: Pose, settings: SamplingSettings, limit: float | None
+) -> Found | None:
+    costmap = ways.costmap
+    if isinstance(costmap, Voxels):
+        return AStar3D(costmap).search(start, goal, SearchSettings(time_limit=limit))
+    if ways.space not in TURNING:
+        return AStar(costmap).search(start, goal, AStarSettings(time_limit=limit))
+    told = HybridAStarSettings(
+        time_limit=limit,
+        motion="dubins" if ways.space == "dubins" else "reeds_shepp",
+        turning_radius=settings.turning_radius,
+    )
+    return HybridAStar(costmap).search(start, goal, told)
+
+
+def _turned(waypoints: Floats, first: float, last: float) -> Floats:
+    """Return poses along a line, shape (n, 3); the yaw goes over from first to last evenly."""
+    along = np.append(0.0, np.cumsum(np.hypot(*np.diff(waypoints, axis=0).T)))
+    share = along / along[-1] if along[-1] > 0.0 else np.linspace(0.0, 1.0, len(along))
+    return np.column_stack([waypoints, first + share * wrap(last - first)])
+
+
+def better_region(
+    region: Bools, size: float, start: Pose, goals: list[Pose], longest: float
+) -> Bools:
+    """Return the cells of a region through which a line may lead that is not longer.
+
+    Parameters
+    ----------
+    region : ndarray of bool, shape (rows, cols) or (layers, rows, cols)
+    size : float [m]
+        Of a cell.
+    start, goals : states [m, corner]
+    longest : float [m]
+        Cells all of whose places are farther from the start and the nearest goal together are left
+        out.
+
+    Examples
+    --------
+    >>> better_region(np.ones((5, 7), bool), 1.0, (1.5, 2.5), [(5.5, 2.5)], 4.0).astype(int)[:3]
+    array([[0, 0, 0, 0, 0, 0, 0],
+           [1, 1, 1, 1, 1, 1, 1],
+           [1, 1, 1, 1, 1, 1, 1]])
+    """
+    axes = region.ndim
+    cells = np.argwhere(region)
+    centres = (cells[:, ::-1] + 0.5) * size
+    from_start = np.linalg.norm(centres - start[:axes], axis=1)
+    to_goal = np.min([np.linalg.norm(centres - goal[:axes], axis=1) for goal in goals], axis=0)
+    better = from_start + to_goal <= longest + math.sqrt(axes) * size
+    kept = np.zeros_like(region)
+    kept[tuple(cells[better].T)] = True
+    return kept
