@@ -31,6 +31,7 @@ from planners.polyanya import PolyanyaSettings
 from planners.problem import PlanningProblem
 from planners.registry import OWN_PLANNERS, PLANNERS, plan
 from planners.route import Route
+from planners.sampling.roadmap import Roadmap
 from planners.sampling.settings import SamplingSettings
 from planners.shortcuts import shortcut
 from planners.smoother import max_curvature, smooth
@@ -63,6 +64,7 @@ __all__ = [
     "PlanningProblem",
     "PolyanyaSettings",
     "ProblemError",
+    "Roadmap",
     "Route",
     "SamplingSettings",
     "SmoothingError",

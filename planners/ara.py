@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -50,15 +50,6 @@ class ARASettings(SearchSettings):
     final_bound: float = Field(
         1.0, ge=1, le=10, description="stop when a route costs at most this many times the least"
     )
-
-
-class _Best(NamedTuple):
-    """The best route so far, and how good it is for sure."""
-
-    cost: float
-    bound: float
-    seconds: float
-    waypoints: Floats
 
 
 class ARA:
@@ -128,7 +119,7 @@ class ARA:
         self.state[EXPANDED] = 0
         best = None
         for best in self._improvements(start, goal, settings, clock):
-            enough = on_improved is not None and on_improved(Improvement(*best))
+            enough = on_improved is not None and on_improved(best)
             if enough or best.bound <= settings.final_bound:
                 break
         if best is None:
@@ -138,16 +129,16 @@ class ARA:
 
     def _improvements(
         self, start: Pose, goal: Pose, settings: ARASettings, clock: Clock
-    ) -> Iterator[_Best]:
+    ) -> Iterator[Improvement]:
         """Yield routes, each with a smaller bound, until one is the best or time is up."""
         ends = ends_of(self.costmap, start, goal)
         if ends.direct:
             waypoints = waypoints_through(self.costmap, start, goal, np.empty((0, 2), int))
-            yield _Best(length_of(waypoints), 1.0, clock.seconds, waypoints)
+            yield Improvement(length_of(waypoints), 1.0, clock.seconds, waypoints)
             return
         self._seed(ends)
         weight, last = _scaled(settings.first_weight), _scaled(settings.final_bound)
-        best: _Best | None = None
+        best: Improvement | None = None
         least, status = 1.0, DONE
         while status == DONE:
             status = self._iterate(ends, weight, clock)
@@ -165,7 +156,7 @@ class ARA:
                 # A shortened end may have made the route before the shorter one.
                 if best is not None and best.cost <= cost:
                     cost, waypoints = best.cost, best.waypoints
-                best = _Best(cost, bound, clock.seconds, waypoints)
+                best = Improvement(cost, bound, clock.seconds, waypoints)
                 yield best
             if weight <= last:
                 return

@@ -53,9 +53,9 @@ class Improvement(NamedTuple):
     """A route, and what is known of it when it is found, while the search goes on."""
 
     cost: float  #: what the planner minimises: the length [m], dearer metres counted more
-    bound: float | None  #: the cost is at most this many times the least; None: unbounded
+    bound: float  #: the cost is at most this many times the least; infinite if nobody knows
     seconds: float  #: since the search began [s]
-    waypoints: Floats | None  #: shape (n, 2) [m, map], not audited; None: OMPL doesn't tell yet
+    waypoints: Floats  #: shape (n, 2) [m, map], not audited; none while OMPL doesn't tell
 
 
 OnImproved: TypeAlias = Callable[[Improvement], bool | None]  #: True: that will do

@@ -16,12 +16,12 @@ from groundmap.arrays import Bools, Floats, Ints
 from groundmap.errors import SettingsError
 from oracles_planning import BLOCKED, FREE, free_field, grid_of
 from planners import CostSettings, PlanningProblem, TimeLimitError
-from planners.ara import ARA, ARASettings, Improvement
+from planners.ara import ARA, ARASettings
 from planners.astar import AStar, AStarSettings, WeightedAStar, WeightedAStarSettings
 from planners.audit import audit
 from planners.costmap import Costmap
 from planners.ends import ends_of
-from planners.engine import Clock, Found, Pose
+from planners.engine import Clock, Found, Improvement, Pose
 from planners.kernels.ara import WAITS
 from planners.kernels.astar import BEST, CAME, DIAGONAL, EXPANDED, FAR, MARK, ONE, ROOT
 

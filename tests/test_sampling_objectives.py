@@ -15,6 +15,7 @@ from groundmap.arrays import Floats
 from groundmap.errors import SettingsError
 from groundmap.grid import ConfidenceGrid
 from oracles_planning import BLOCKED, grid_of
+from planners import plan
 from planners.costmap import Costmap
 from planners.costs import CostSettings
 from planners.curves import dubins, reeds_shepp
@@ -263,6 +264,8 @@ def test_where_only_length_counts_the_cost_is_what_ompl_says(
     x, y = state_of(theirs, a, space), state_of(theirs, b, space)
     assert objective.edge(*a, *b) == pytest.approx(native.motionCost(x, y).value(), rel=1e-6)
     assert objective.least(*a, *b) == objective.edge(*a, *b)
+    assert objective.scale == 4.0
+    assert objective.cost([a, b]) == pytest.approx(4.0 * native.motionCost(x, y).value(), rel=1e-6)
 
 
 @needs_ompl
@@ -310,8 +313,12 @@ def test_planners_that_heed_no_costs_are_refused_where_these_count() -> None:
         dear.check(planner)
     for planner in ("rrtconnect", "prmstar"):
         plain.check(planner)
-        with pytest.raises(ProblemError, match=rf"heeds costs .*: bfmt, bitstar, .*'{planner}'"):
+        with pytest.raises(ProblemError, match=rf"costs .* in 'r2', got '{planner}'.* bfmt, bit"):
             dear.check(planner)
+    curved = objective_of(ways_over(z, "dubins"))
+    curved.check("bitstar")
+    with pytest.raises(ProblemError, match=r"in 'dubins', got 'fmt'. .*: bitstar, informedrrt"):
+        curved.check("fmt")
 
 
 def test_something_has_to_cost_something() -> None:
@@ -348,3 +355,67 @@ def test_no_path_is_longer_than_its_cost_allows(
 def test_where_metres_may_cost_nothing_a_path_may_be_as_long_as_it_likes() -> None:
     ways = ways_over(np.full((SIDE, SIDE), -1.0), "r2")
     assert objective_of(ways, length_weight=0.0).longest(1.0) == math.inf
+
+
+def around_a_block(space: Space, costs: CostSettings) -> PlanningProblem:
+    z = np.full((SIDE, SIDE), -1.0)
+    z[8:16, 8:16] = BLOCKED
+    return PlanningProblem(
+        grid_of(z, resolution=SIZE),
+        start=(2.0, 2.0, 0.0),
+        goal=(10.0, 10.0, 1.5),
+        footprint=0.4 if space == "r2" else [(-0.3, -0.3), (0.5, -0.3), (0.5, 0.3), (-0.3, 0.3)],
+        costs=costs,
+        clear_start=False,
+    )
+
+
+@needs_ompl
+@pytest.mark.parametrize("planner", sorted(HEEDING))
+def test_routes_of_planners_that_heed_costs_come_near_those_of_a_star(planner: str) -> None:
+    problem = around_a_block("r2", CostSettings(clearance_weight=3.0))
+    told: dict[str, Any] = (
+        {} if "fmt" in planner else {"iterations": 6000 if planner == "bitstar" else 600}
+    )
+    route = plan(problem, planner, **told)
+    assert route.audit == "clean"
+    assert route.cost <= 1.03 * plan(problem, "astar").cost
+    ways = Ways(Costmap.of(problem), "r2", 1.0)
+    states = [ways.state_of(xy) for xy in route.waypoints.tolist()]
+    assert route.cost == pytest.approx(objective_of(ways).cost(states))
+
+
+@needs_ompl
+@pytest.mark.parametrize("space", PLANE)
+def test_who_pays_for_nearness_keeps_more_distance(space: Space) -> None:
+    told: dict[str, Any] = {"space": space, "iterations": 3000}
+    near, far = (
+        plan(around_a_block(space, CostSettings(clearance_weight=weight)), "bitstar", **told)
+        for weight in (0.0, 10.0)
+    )
+    assert far.mean_clearance > near.mean_clearance + 0.1
+    assert far.length > near.length
+    assert far.cost >= far.length * (1.0 - 1e-9)
+
+
+@needs_ompl
+def test_who_pays_for_time_turns_while_driving() -> None:
+    problem = around_a_block("se2", PLAIN)
+    told: dict[str, Any] = {"space": "se2", "iterations": 600, "max_turn_rate": 0.2}
+    ways = Ways(Costmap.of(problem), "se2", 1.0)
+    hurried = SamplingSettings(length_weight=0.0, time_weight=1.0, max_turn_rate=0.2)
+    costs = []
+    other: dict[str, Any] = {"length_weight": 0.0, "time_weight": 1.0}
+    for weights in ({}, other):
+        route = plan(problem, "rrtstar", **told, **weights)
+        poses = np.column_stack([route.waypoints, route.headings]).tolist()
+        costs.append(Objective(ways, hurried).cost([ways.state_of(pose) for pose in poses]))
+    assert costs[1] <= costs[0] * (1.0 + 1e-9)
+
+
+@needs_ompl
+def test_a_seed_repeats_a_route_over_dear_cells() -> None:
+    problem = around_a_block("r2", CostSettings(clearance_weight=3.0))
+    first, again = (plan(problem, "rrtstar", iterations=300, seed=5) for _ in range(2))
+    np.testing.assert_array_equal(again.waypoints, first.waypoints)
+    assert again.cost == first.cost

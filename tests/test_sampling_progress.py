@@ -78,7 +78,7 @@ def test_every_better_route_is_told_and_the_last_is_the_route(name: str) -> None
     assert seconds == sorted(seconds)
     assert costs[-1] == pytest.approx(route.cost, rel=1e-6)
     np.testing.assert_array_equal(improvements[-1].waypoints, route.waypoints)
-    assert all(better.bound is None for better in improvements)
+    assert all(better.bound == math.inf for better in improvements)
 
 
 @pytest.mark.parametrize("name", sorted(set(BETTERING) - set(THREADED)))
@@ -186,7 +186,7 @@ def test_a_warm_start_is_never_beaten_by_what_it_began_with(name: str, space: st
     )
     assert route.audit == "clean"
     assert route.cost <= improvements[0].cost
-    assert improvements[0].waypoints is not None
+    assert len(improvements[0].waypoints) > 1
     if space == "r2":
         assert improvements[0].cost == pytest.approx(plan(asked, "astar").cost)
 

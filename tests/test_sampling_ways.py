@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import math
+from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -16,6 +19,8 @@ from groundmap.arrays import Bools, Floats
 from oracles_curves import placed_at
 from oracles_planning import BLOCKED, FREE, grid_of, union_of_squares
 from planners.costmap import Costmap
+from planners.kernels.sampling import curve_clear, slide_clear
+from planners.kernels.sampling_lines import line_clear
 from planners.problem import PlanningProblem
 from planners.sampling.settings import Space
 from planners.sampling.ways import Ways
@@ -149,3 +154,65 @@ def test_what_can_be_reached_lies_in_the_room(rng: np.random.Generator, at: int)
             for state in (a, b):
                 assert room[0] <= state[0] <= room[2]
                 assert room[1] <= state[1] <= room[3]
+
+
+@given(rng=rngs())
+@settings(max_examples=20)
+def test_a_check_outlives_its_ways_and_says_what_its_kernel_says(rng: np.random.Generator) -> None:
+    blocked = speckled(rng)
+    for space in get_args(Space):
+        if space == "r3":
+            continue
+        footprint = 0.3 if space == "r2" else CAR
+        ways = ways_over(blocked, footprint, space)
+        told, is_clear = kernel_of(ways), ways.is_clear
+        del ways
+        gc.collect()
+        for _ in range(20):
+            ends = [pose_of(rng)[: 2 if space == "r2" else 3] for _ in range(2)]
+            assert is_clear(*ends[0], *ends[1]) is told(*ends[0], *ends[1])
+
+
+def kernel_of(ways: Ways) -> Callable[..., bool]:
+    """Return the check with copies of all its arrays."""
+    body: list[Any] = [array.copy() for array in ways.body]
+    if ways.space == "r2":
+        return partial(line_clear, body[0], body[2], SIZE, ways.costmap.radius / SIZE)
+    if ways.space == "se2":
+        return partial(slide_clear, *body)
+    return partial(curve_clear, ways.space == "dubins", *body)
+
+
+@pytest.mark.parametrize("footprint", [0.0, 0.3, CAR])
+@pytest.mark.parametrize("space", ["r2", "se2", "dubins"])
+def test_states_off_the_map_are_not_clear(space: Space, footprint: Any) -> None:
+    ways = ways_over(np.zeros((SIDE, SIDE), dtype=np.bool_), footprint, space)
+    high = SIZE * np.array(ways.costmap.blocked.shape[::-1])
+    inside = ways.state_of((6.0, 6.0, 0.0))[:2]
+    yaw = () if space == "r2" else (0.3,)
+    assert ways.is_clear(*inside, *yaw, *inside, *yaw)
+    for x in (-0.1, np.nextafter(0.0, -1.0), high[0], math.inf, -math.inf, math.nan):
+        off = float(x), inside[1]
+        assert not ways.is_clear(*inside, *yaw, *off, *yaw)
+        assert not ways.is_clear(*off, *yaw, *inside, *yaw)
+    corner = tuple(np.nextafter(high, 0.0).tolist())
+    assert not ways.is_clear(*inside, *yaw, *corner, *yaw)  # what lies around a map is unknown
+
+
+def test_edges_are_short_where_room_is_scarce_and_never_longer_than_a_share_of_the_map() -> None:
+    hall = np.zeros((SIDE, SIDE), dtype=np.bool_)
+    ranges = []
+    for walls in (hall, speckled_evenly(3), speckled_evenly(2)):
+        ways = ways_over(walls, 0.0, "r2")
+        state = ways.state_of((SIZE / 2.0, SIZE / 2.0))
+        region, room = ways.region(state), ways.room(state, state)
+        assert room is not None
+        ranges.append(ways.reach(region, room))
+    assert ranges[0] == pytest.approx(0.2 * math.sqrt(2.0) * SIZE * SIDE)
+    assert ranges[0] > ranges[1] > ranges[2] > SIZE
+
+
+def speckled_evenly(every: int) -> Bools:
+    blocked = np.zeros((SIDE, SIDE), dtype=np.bool_)
+    blocked[every - 1 :: every, every - 1 :: every] = True
+    return blocked

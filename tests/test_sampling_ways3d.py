@@ -198,8 +198,10 @@ def test_what_lies_beyond_the_map_is_never_clear() -> None:
         assert not ways.is_clear(*inside, *outside)
         assert not ways.is_clear(*outside, *inside)
         assert not ways.is_clear(*outside, *outside)
-    corner = (math.nextafter(width, 0.0),) * 3
-    assert ways.is_clear(*inside, *corner)
+    corners = product((0.0, math.nextafter(width, 0.0)), repeat=3)
+    places = np.random.default_rng(0).uniform(0.0, width, (500, 3)).tolist()
+    for corner, place in product(corners, places):  # whose sums round to what is off the map
+        assert ways.is_clear(*place, *corner)
     assert ways.is_clear(*inside, *inside)
 
 
@@ -274,3 +276,17 @@ def test_places_come_back_as_they_were_given(rng: np.random.Generator) -> None:
     assert [ways.cell_of(state) for state in states] == [
         tuple(ways.voxels.window.world_to_cell(place)[0]) for place in given_places
     ]
+
+
+def test_edges_reach_farther_where_there_is_more_room() -> None:
+    blocked = np.zeros((SIDE,) * 3, dtype=np.bool_)
+    reaches = []
+    for share in (0.0, 0.01, 0.1):
+        blocked |= np.random.default_rng(1).random(blocked.shape) < share
+        ways = ways_over(blocked, 0.1)
+        start = ways.state_of((1.0, 6.0, 5.0))
+        room = ways.room(start, start)
+        assert room is not None
+        reaches.append(ways.reach(ways.region(start), room))
+    assert reaches[0] == pytest.approx(0.2 * SIDE * 0.5 * math.sqrt(3.0))  # that of the extent
+    assert reaches[0] >= reaches[1] > reaches[2] > 0.0

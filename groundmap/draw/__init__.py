@@ -8,6 +8,7 @@ nearly black.
 from groundmap.draw.case import draw_case
 from groundmap.draw.curves import curves_png, draw_curves
 from groundmap.draw.figure import check_picture, figure_png, new_figure, save_figure
+from groundmap.draw.graphs import draw_graph
 from groundmap.draw.maps import draw_grid, draw_trajectory, draw_verdicts, known_bounds
 from groundmap.draw.routes import draw_route, draw_routes
 from groundmap.draw.truth import draw_difference, draw_truth
@@ -19,6 +20,7 @@ __all__ = [
     "draw_case",
     "draw_curves",
     "draw_difference",
+    "draw_graph",
     "draw_grid",
     "draw_route",
     "draw_routes",

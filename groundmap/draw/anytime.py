@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from groundmap.arrays import as_floats, check_finite
+from groundmap.arrays import Floats, as_floats, check_finite
 from groundmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -30,16 +29,24 @@ class Progress(NamedTuple):
 
     Attributes
     ----------
-    points : array_like, shape (n, 2)
+    points : sequence or ndarray, shape (n, 2)
         Seconds, rising, and the ratio of the cost to the optimum; the last is the route that was
         handed out. One: a planner that doesn't better its route. None: no route.
     solved, asked : int
         Seeds.
     """
 
-    points: npt.ArrayLike
+    points: Sequence[Sequence[float]] | Floats
     solved: int
     asked: int
+
+
+class Style(NamedTuple):
+    """How a planner is drawn."""
+
+    color: str
+    marker: str
+    lined: bool  #: whether it betters its routes
 
 
 class Panel(NamedTuple):
@@ -50,22 +57,32 @@ class Panel(NamedTuple):
     note: str = ""  #: what the ratio is to
 
 
-def styles(names: Iterable[str]) -> dict[str, tuple[str, str]]:
-    """Return a colour and a marker for each name; no two names share both.
+def styles(panels: Sequence[Panel]) -> dict[str, Style]:
+    """Return a style for each planner: first those that better their routes, by name.
+
+    Their colours differ, as far as there are colours; no two planners share colour and marker.
 
     Examples
     --------
-    >>> styles(["rrt", "bitstar", "rrt"])
-    {'bitstar': ('#0072b2', 'o'), 'rrt': ('#d55e00', 's')}
+    >>> once, better = Progress([(1, 2)], 1, 1), Progress([(1, 2), (3, 1)], 1, 1)
+    >>> for name, style in styles([Panel("", {"rrt": once, "bitstar": better})]).items():
+    ...     print(name, *style)
+    bitstar #0072b2 o True
+    rrt #d55e00 s False
     """
+    names = {name for panel in panels for name in panel.progress}
+    lined = {
+        name for panel in panels for name, done in panel.progress.items() if len(done.points) > 1
+    }
+    ordered = [*sorted(lined), *sorted(names - lined)]
     return {
-        name: (COLOURS[i % len(COLOURS)], MARKERS[i % len(MARKERS)])
-        for i, name in enumerate(sorted(set(names)))
+        name: Style(COLOURS[i % len(COLOURS)], MARKERS[i % len(MARKERS)], name in lined)
+        for i, name in enumerate(ordered)
     }
 
 
 def draw_anytime(
-    progress: Mapping[str, Progress], *, style: Mapping[str, tuple[str, str]], ax: Axes
+    progress: Mapping[str, Progress], *, style: Mapping[str, Style], ax: Axes
 ) -> list[Artist]:
     """Draw cost over time: a line for each planner that betters its route, else a marker.
 
@@ -75,7 +92,7 @@ def draw_anytime(
     Parameters
     ----------
     progress : mapping of str to Progress
-    style : mapping of str to (colour, marker)
+    style : mapping of str to Style
         As `styles` returns it.
     ax : matplotlib Axes
 
@@ -91,7 +108,7 @@ def draw_anytime(
         check_finite(name, points)
         if len(points) == 0:
             continue
-        color, marker = style[name]
+        color, marker, _ = style[name]
         artists += ax.plot(
             *points.T, color=color, marker=marker, markevery=[len(points) - 1], linewidth=1.5,
             markersize=6.5, markeredgewidth=1.3, alpha=0.9, drawstyle="steps-post",
@@ -102,31 +119,29 @@ def draw_anytime(
     return artists
 
 
-def draw_success(
-    panels: Sequence[Panel], *, style: Mapping[str, tuple[str, str]], ax: Axes
-) -> list[Artist]:
+def draw_success(panels: Sequence[Panel], *, style: Mapping[str, Style], ax: Axes) -> list[Artist]:
     """Draw a table of how many seeds were solved: a row for each planner, with its marker.
 
     Parameters
     ----------
     panels : sequence of Panel
         The columns.
-    style : mapping of str to (colour, marker)
+    style : mapping of str to Style
         The rows.
     ax : matplotlib Axes
     """
     from matplotlib.patches import Rectangle
 
     artists: list[Artist] = []
-    for row, (name, (color, marker)) in enumerate(style.items()):
+    for row, (name, (color, marker, lined)) in enumerate(style.items()):
         artists += ax.plot(
             [-2.6, -2.25, -1.9], [row] * 3, color=color, marker=marker, markevery=[2],
-            markersize=6.5, linewidth=1.5,
+            markersize=6.5, linewidth=1.5 if lined else 0.0,
         )  # fmt: skip
         artists.append(ax.text(-1.7, row, name, va="center", fontsize=8.5))
         for column, panel in enumerate(panels):
             done = panel.progress.get(name)
-            shade, said = ("white", "–") if done is None else (_shade(done), f"{done.solved}")
+            shade, said = ("white", "-") if done is None else (_shade(done), f"{done.solved}")
             box = Rectangle((column - 0.5, row - 0.5), 1, 1, facecolor=shade, edgecolor="white")
             artists.append(ax.add_patch(box))
             artists.append(ax.text(column, row, said, ha="center", va="center", fontsize=8.5))
@@ -157,16 +172,17 @@ def anytime_figure(panels: Sequence[Panel], *, columns: int) -> Figure:
 
     if not panels:
         raise InputError("panels", "one at least", "none")
-    style = styles(name for panel in panels for name in panel.progress)
+    style = styles(panels)
     rows = -(-len(panels) // columns)
     heights = [rows * PANEL[1], (len(style) + 3.5) * LINE]
     width = max(PANEL[0] * columns, 0.75 * len(panels) + 2.0, 6.0)
     figure = Figure(figsize=(width, sum(heights)), layout="constrained")
-    above, below = figure.subfigures(2, 1, height_ratios=heights)
+    parts: Any = figure.subfigures(2, 1, height_ratios=heights)
+    above, below = parts
     grid = above.subplots(rows, columns, squeeze=False)
     for panel, ax in zip(panels, grid.flat, strict=False):
         draw_anytime(panel.progress, style=style, ax=ax)
-        ax.set_title(panel.title, fontsize=10, loc="left")
+        ax.set_title(panel.title, fontsize=9.5, loc="left")
         ax.set_title(panel.note, fontsize=8, loc="right", color="0.35")
     for ax in grid.flat[len(panels) :]:
         ax.set_axis_off()
@@ -217,3 +233,4 @@ def _same_times(axes: Iterable[Axes]) -> None:
     low, high = float(np.min(times)), float(np.max(times))
     for ax in every:
         ax.set_xlim(low / 1.5, high * 1.5)
+        ax.xaxis.set_major_formatter("{x:g}")

@@ -5,7 +5,8 @@ from __future__ import annotations
 import multiprocessing
 import signal
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections import deque
+from collections.abc import Callable, Generator, Iterable
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any, Generic, TypeVar
@@ -19,6 +20,9 @@ TICK = 1.0  # [s] between two looks at who is overdue
 class _Hand(Generic[T, R]):
     """One process, and what it has in hand."""
 
+    task: T
+    due: float
+
     def __init__(self, act: Callable[[T], R]) -> None:
         context = multiprocessing.get_context("spawn")
         self.pipe, theirs = context.Pipe()
@@ -31,13 +35,16 @@ class _Hand(Generic[T, R]):
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
         theirs.close()
-        self.task: T | None = None
-        self.due = 0.0
 
     def give(self, task: T, patience: float) -> None:
         """Hand over a task."""
         self.task, self.due = task, time.monotonic() + patience
         self.pipe.send(task)
+
+    @property
+    def is_overdue(self) -> bool:
+        """Whether it has had its task for too long."""
+        return time.monotonic() >= self.due
 
     def dismiss(self) -> None:
         """End the process, whatever it does."""
@@ -53,7 +60,7 @@ def crew(
     jobs: int,
     patience: float,
     lost: Callable[[T, str], R],
-) -> Iterator[tuple[T, R]]:
+) -> Generator[tuple[T, R]]:
     """Yield tasks with their results, as they come in.
 
     Parameters
@@ -69,51 +76,37 @@ def crew(
     lost : callable
         Makes the result of a task whose process ended, of the task and what happened.
     """
-    left = iter(tasks)
+    left = deque(tasks)
     hands: list[_Hand[T, R]] = []
     try:
-        for task in left:
-            hands.append(_Hand(act))
-            hands[-1].give(task, patience)
-            if len(hands) == jobs:
-                break
-        while hands:
+        while left or hands:
+            while left and len(hands) < jobs:
+                hands.append(_Hand(act))
+                hands[-1].give(left.popleft(), patience)
             ready = wait([hand.pipe for hand in hands], timeout=TICK)
-            for hand in list(hands):
-                if hand.pipe not in ready and time.monotonic() < hand.due:
-                    continue
-                done = hand.task
-                assert done is not None
-                result, fit = _result(hand, done, lost, patience)
-                if not fit:
+            for hand in [hand for hand in hands if hand.pipe in ready or hand.is_overdue]:
+                task = hand.task
+                result, fit = _result(hand, lost, patience)
+                if fit and left:
+                    hand.give(left.popleft(), patience)
+                else:
                     hands.remove(hand)
                     hand.dismiss()
-                following = next(left, None)
-                if following is not None:
-                    if not fit:
-                        hand = _Hand(act)
-                        hands.append(hand)
-                    hand.give(following, patience)
-                elif fit:
-                    hands.remove(hand)
-                    hand.dismiss()
-                yield done, result
+                yield task, result
     finally:
         for hand in hands:
             hand.dismiss()
 
 
-def _result(
-    hand: _Hand[T, R], task: T, lost: Callable[[T, str], R], patience: float
-) -> tuple[R, bool]:
-    """Return the result of a task, and whether its process can go on."""
+def _result(hand: _Hand[T, R], lost: Callable[[T, str], R], patience: float) -> tuple[R, bool]:
+    """Return the result of what a process has in hand, and whether it can go on."""
     if not hand.pipe.poll():
-        return lost(task, f"its process did not end within {patience:g} s"), False
+        return lost(hand.task, f"its process did not end within {patience:g} s"), False
     try:
         result: R = hand.pipe.recv()
     except EOFError:
         hand.process.join()
-        return lost(task, f"its process ended with {hand.process.exitcode}"), False
+        return lost(hand.task, f"its process ended with {hand.process.exitcode}"), False
     return result, True
 
 

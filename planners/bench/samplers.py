@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import closing
 from itertools import product
 from typing import Any, NamedTuple, get_args
 
@@ -18,7 +19,7 @@ from planners.sampling.settings import Space, refusal
 SPACES: tuple[Space, ...] = get_args(Space)
 PATIENCE = 120.0  # [s] beyond the time limit, for what is made and compiled before
 MOMENTS = 80  # points of a curve, at most
-FINDS = 2  # what everybody tells: the route as found, and as handed out
+FINDS = 3  # what everybody may tell: a route as it was found, as it was checked, and simplified
 
 
 class Refused(NamedTuple):
@@ -51,7 +52,8 @@ def entered(
 
     A workload that has no query in a space is left out there.
     """
-    pairs = list(product(planners, spaces))
+    asked = [space for space in spaces if any(space in work.cases() for work in works)]
+    pairs = list(product(planners, asked))
     refused = [Refused(*pair, reason) for pair in pairs if (reason := refusal(*pair))]
     out = {pair[:2] for pair in refused}
     trials = [
@@ -80,9 +82,9 @@ def run(
     for work, space, planner, *_ in trials:
         races.setdefault((work, space, planner), Race(work.name, space, planner, []))
     patience = PATIENCE + max((trial.time_limit for trial in trials), default=0.0)
-    results = crew(trials, attempted, jobs=jobs, patience=patience, lost=lost)
-    for trial, attempt in watch(results):
-        races[trial[:3]].attempts.append(attempt)
+    with closing(crew(trials, attempted, jobs=jobs, patience=patience, lost=lost)) as results:
+        for trial, attempt in watch(results):
+            races[trial[:3]].attempts.append(attempt)
     return list(races.values())
 
 
@@ -150,25 +152,25 @@ def row(race: Race, optimum: Optimum) -> dict[str, Any]:
 def progress(race: Race, optimum: float) -> list[tuple[float, float]]:
     """Return the median ratio to the optimum over time, as (seconds, ratio).
 
-    An attempt without a route counts as infinitely dear, so a curve begins when half of all
-    attempts have one. Of a planner that stops at its first route, and of one that solves less than
-    half, there is only the last point: the medians of what was handed out.
+    An attempt without a route counts as infinitely dear, so a curve begins when more than half of
+    all attempts have one. Of a planner that stops at its first route, and of one that solves half
+    or less, there is only one point: the medians of what was handed out.
     """
     won = [attempt for attempt in race.attempts if attempt.solved]
     if not won:
         return []
     end = float(np.median([attempt.betters[-1][0] for attempt in won]))
-    last = end, float(np.median([attempt.cost for attempt in won])) / optimum
-    if all(len(attempt.betters) <= FINDS for attempt in won):
-        return [last]
+    if 2 * len(won) <= len(race.attempts) or all(len(one.betters) <= FINDS for one in won):
+        return [(end, float(np.median([attempt.cost for attempt in won])) / optimum)]
     moments = _moments(np.array([time for attempt in won for time, _ in attempt.betters]), end)
-    best = np.full((len(race.attempts), len(moments)), np.inf)
+    best = np.full((len(race.attempts), len(moments) + 1), np.inf)
     for attempt, costs in zip(won, best, strict=False):
         for time, cost in attempt.betters:
-            costs[moments >= time] = cost
-    median = np.sort(best, axis=0)[(len(best) - 1) // 2] / optimum
-    points = zip(moments.tolist(), median.tolist(), strict=True)
-    return [*((time, ratio) for time, ratio in points if np.isfinite(ratio)), last]
+            costs[:-1][moments >= time] = cost
+        costs[-1] = attempt.cost
+    median = np.median(best, axis=0) / optimum
+    points = zip([*moments.tolist(), end], median.tolist(), strict=True)
+    return [(time, ratio) for time, ratio in points if np.isfinite(ratio)]
 
 
 def processors() -> int:

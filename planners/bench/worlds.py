@@ -10,7 +10,8 @@ import numpy as np
 import shapely
 
 from groundmap import ConfidenceGrid
-from groundmap.io.map_images import BlockedMap, grid_of
+from groundmap.arrays import Bools
+from groundmap.io.map_images import BlockedMap, BlockedVoxels, grid_of
 from groundmap.simulate.truth import touched_cells
 from groundmap.simulate.worlds.rooms import Rooms
 from planners.engine import Pose
@@ -41,25 +42,40 @@ def rectangle(rear: float, front: float, width: float) -> list[tuple[float, floa
 def doorway() -> Cases:
     """Return two halls of 10 x 8 m and the door between them, 1.0 m wide, far from any corner.
 
-    A disc of 0.6 m has 0.2 m to spare on each side of it, a cart of 1.0 x 0.6 m the same.
+    A disc of 0.6 m has 0.2 m to spare on each side of it, a cart of 1.0 x 0.6 m the same. In 3-D
+    the halls are 3 m high, the door is 2 m high, and a ball of 0.6 m flies through it.
     """
-    wall = shapely.box(10.0, 0.0, 10.2, 8.0) - shapely.box(9.0, 5.0, 11.0, 6.0)
-    grid = raster(shapely.box(0.0, 0.0, 20.2, 8.0) - wall, resolution=0.1)
-    ends = (1.5, 1.5, 0.0), (18.5, 1.5, 0.0)
-    return cases(grid, *ends, disc=0.3, outline=rectangle(0.25, 0.75, 0.6), turning_radius=0.8)
+    wall = shapely.box(10.0, 0.0, 10.2, 8.0)
+    beside = shapely.box(0.0, 0.0, 20.2, 8.0) - wall
+    free = beside | shapely.box(9.0, 5.0, 11.0, 6.0)
+    ends, cart = ((1.5, 1.5, 0.0), (18.5, 1.5, 0.0)), rectangle(0.25, 0.75, 0.6)
+    grid = raster(free, resolution=0.1)
+    layers = stacked([free] * 10 + [beside] * 5, resolution=0.2)
+    return {
+        **cases(grid, *ends, disc=0.3, outline=cart, turning_radius=0.8),
+        "r3": flown(layers, (1.5, 1.5, 0.6), (18.5, 1.5, 2.4), ball=0.3),
+    }
 
 
 def rooms() -> Cases:
-    """Return 4 x 4 furnished rooms of 8 m with doors of 2 m, crossed from corner to corner."""
+    """Return 4 x 4 furnished rooms of 8 m with doors of 2 m, crossed from corner to corner.
+
+    In 3-D a ball of 1 m flies through them, and over what is low.
+    """
     made = Rooms(
         columns=4, rows=4, room_width=8, room_depth=8, door_width=2, passage=1.6, loops=0.5, boxes=4
     )
     world = made.make(np.random.default_rng(SEED))
-    free = shapely.box(*world.bounds) - world.obstacles(STEP_HEIGHT, ROBOT_HEIGHT)
-    first, last = made.centres()[[0, -1]].tolist()
-    ends = (*first, 0.5), (*last, 1.0)
-    cart = rectangle(0.5, 1.0, 0.9)
-    return cases(raster(free, resolution=0.2), *ends, disc=0.5, outline=cart, turning_radius=1.0)
+
+    def between(low: float, high: float) -> shapely.Geometry:
+        return shapely.box(*world.bounds) - world.obstacles(low, high)
+
+    (x0, y0), (x1, y1) = made.centres()[[0, -1]].tolist()
+    grid, cart = raster(between(STEP_HEIGHT, ROBOT_HEIGHT), resolution=0.2), rectangle(0.5, 1, 0.9)
+    layers = [between(z, z + 0.25) for z in np.arange(10) * 0.25]
+    flight = flown(stacked(layers, resolution=0.25), (x0, y0, 1.0), (x1, y1, 1.5), ball=0.5)
+    ends = (x0, y0, 0.5), (x1, y1, 1.0)
+    return {**cases(grid, *ends, disc=0.5, outline=cart, turning_radius=1.0), "r3": flight}
 
 
 def parking() -> Cases:
@@ -113,14 +129,32 @@ def cases(
     }
 
 
+def flown(grid: ConfidenceGrid, start: Pose, goal: Pose, *, ball: float) -> Case:
+    """Return a query on a 3-D map."""
+    return Case(
+        PlanningProblem(grid, start=start, goal=goal, footprint=ball, clear_start=False), {}
+    )
+
+
 def raster(free: shapely.Geometry, *, resolution: float) -> ConfidenceGrid:
     """Return a map of what is free [m, map]; cells that anything else reaches into are blocked."""
+    blocked = _blocked(free, resolution)
+    low = (free.bounds[0], free.bounds[1])
+    return grid_of(BlockedMap(blocked, np.zeros_like(blocked), resolution, low))
+
+
+def stacked(layers: list[shapely.Geometry], *, resolution: float) -> ConfidenceGrid:
+    """Return a 3-D map of what is free in each layer, from z = 0 upwards; all as wide."""
+    blocked = np.stack([_blocked(free, resolution) for free in layers])
+    low = (layers[0].bounds[0], layers[0].bounds[1], 0.0)
+    return grid_of(BlockedVoxels(blocked, resolution, low))
+
+
+def _blocked(free: shapely.Geometry, resolution: float) -> Bools:
     low, high = np.reshape(free.bounds, (2, 2))
     cols, rows = np.ceil((high - low) / resolution - 1e-6).astype(int).tolist()
     others = shapely.box(*low, *(low + resolution * np.array([cols, rows]))) - free
-    blocked = touched_cells(others, low, resolution, (rows, cols))
-    unknown = np.zeros_like(blocked)
-    return grid_of(BlockedMap(blocked, unknown, resolution, (float(low[0]), float(low[1]))))
+    return touched_cells(others, low, resolution, (rows, cols))
 
 
 def _parked(bay: int, middle: float) -> shapely.Polygon:

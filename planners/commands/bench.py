@@ -83,7 +83,10 @@ def planning_command(
     ] = 1.0,
     jobs: Annotated[
         int | None,
-        typer.Option(min=1, help="Processes at a time; as many as processors unless told."),
+        typer.Option(
+            min=1,
+            help="Processes at a time; as many as processors unless told. One is best for times.",
+        ),
     ] = None,
     plot: Annotated[
         Path | None,
@@ -96,10 +99,12 @@ def planning_command(
     With --samplers, planners that are refused somewhere are named with the reason, and routes that
     are not found count against their planner: exit 0.
     """
-    if samplers == (movingai is not None):
+    if samplers and movingai is not None:
+        raise typer.BadParameter("expected --movingai or --samplers, got both")
+    if not samplers and movingai is None:
         raise typer.BadParameter(
-            "expected a folder with maps and queries of the MovingAI benchmark, or --samplers, got"
-            f" {'both' if samplers else 'none'}",
+            "expected a folder with maps and queries of the MovingAI benchmark, got none"
+            " (or take --samplers)",
             param_hint="--movingai",
         )
     if movingai is not None:

@@ -14,7 +14,6 @@ import numpy as np
 from numba import njit
 
 from groundmap.arrays import Bools, Floats, Ints
-from planners.kernels.clearance import segment_clearance
 from planners.kernels.curves import SEGMENTS, along, dubins_word, reeds_shepp_word, wrap
 from planners.kernels.footprint import (
     TOUCH,
@@ -25,8 +24,8 @@ from planners.kernels.footprint import (
     step_clear,
     within,
 )
+from planners.kernels.sampling_lines import line_clear
 
-NEAR = 0.2  # [cells] room below which a line is checked exactly instead of stepped along
 PIECE = 4.0  # [cells] curves are cut into motions of that length
 # What `Body.numbers` holds.
 SIZE, TURNING, RADIUS, ARM, SPIKE, INSCRIBED, BULGE = range(7)
@@ -42,55 +41,6 @@ class Body(NamedTuple):
     begins: Ints  #: as in `Shape`
     discs: Floats  #: as in `Shape` [cells]
     numbers: Floats  #: shape (7,); a cell's side [m], the turning radius and `Shape`'s [cells]
-
-
-@njit(cache=True, nogil=True)
-def line_clear(
-    blocked: Bools,
-    clearance: Floats,
-    size: float,
-    radius: float,
-    ax: float,
-    ay: float,
-    bx: float,
-    by: float,
-) -> bool:
-    """Whether a disc, moved along the straight line from a to b, overlaps no blocked square.
-
-    Where the distance field vouches for room, the line is followed by as much at once; elsewhere
-    its exact distance to the squares decides, a cell's side at a time.
-
-    Parameters
-    ----------
-    blocked : ndarray of bool, shape (rows, cols)
-    clearance : ndarray, shape (rows, cols) [cells]
-    size : float [m]
-        Of a cell.
-    radius : float [cells]
-    ax, ay, bx, by : float [m]
-    """
-    ax, ay, bx, by = ax / size, ay / size, bx / size, by / size
-    if not (within(clearance, ax, ay, 0.0) and within(clearance, bx, by, 0.0)):
-        return False
-    need = max(radius, 2.0 * TOUCH)
-    length = math.hypot(bx - ax, by - ay)
-    at = 0.0
-    while True:
-        s = at / length if length > 0.0 else 0.0
-        x, y = ax + s * (bx - ax), ay + s * (by - ay)
-        least, most = nearness(clearance, x, y)
-        if most < need - TOUCH:
-            return False
-        if least - need >= NEAR:
-            at += least - need
-        else:
-            t = min((at + 1.0) / length, 1.0) if length > 0.0 else 0.0
-            to_x, to_y = ax + t * (bx - ax), ay + t * (by - ay)
-            if segment_clearance(blocked, x, y, to_x, to_y, need) < need - TOUCH:
-                return False
-            at += 1.0
-        if at >= length:
-            return True
 
 
 @njit(cache=True, nogil=True)
@@ -122,7 +72,12 @@ def slide_clear(
     ax, ay, a, bx, by, b : float [m, rad]
     """
     ground, shape = Ground(blocked, before, clearance), _shape(corners, begins, discs, numbers)
-    size = numbers[SIZE]
+    size, inscribed = numbers[SIZE], shape.inscribed
+    if len(corners) == 0:  # it looks the same at every yaw
+        return line_clear(blocked, clearance, size, shape.radius, ax, ay, bx, by)
+    # Most edges that aren't clear cross a wall, which the disc within the footprint finds sooner.
+    if inscribed > TOUCH and not line_clear(blocked, clearance, size, inscribed, ax, ay, bx, by):
+        return False
     ax, ay, bx, by = ax / size, ay / size, bx / size, by / size
     if not (within(clearance, ax, ay, 0.0) and within(clearance, bx, by, 0.0)):
         return False
@@ -196,16 +151,53 @@ def curve_clear(
         ax, ay, a, bx, by, b = bx, by, b, ax, ay, a
     size = numbers[SIZE]
     x, y, yaw = ax / size, ay / size, a
-    if not within(clearance, x, y, 0.0):
+    if not (within(clearance, x, y, 0.0) and _may_stand(ground, shape, bx / size, by / size)):
         return False
     curvatures, lengths = curve_motions(forward, numbers, ax, ay, a, bx, by, b)
     if len(lengths) == 0:
         return step_clear(ground, shape, x, y, yaw, x, y, yaw, 0.0)
+    if not _may_pass(ground, shape, x, y, yaw, curvatures, lengths):
+        return False
     for i in range(len(lengths)):
         if not motion_clear(ground, shape, x, y, yaw, curvatures[i], lengths[i]):
             return False
         x, y, yaw = along(x, y, yaw, curvatures[i], lengths[i])
     return True
+
+
+@njit(cache=True, nogil=True)
+def _may_pass(
+    ground: Ground,
+    shape: Shape,
+    x: float,
+    y: float,
+    yaw: float,
+    curvatures: Floats,
+    lengths: Floats,
+) -> bool:
+    """Whether base_link may be at some places along a curve: that rules out most, at once."""
+    for i in range(len(lengths)):
+        at, length = 0.0, abs(lengths[i])
+        while at < length:
+            driven = math.copysign(at, lengths[i])
+            at_x, at_y, _ = along(x, y, yaw, curvatures[i], driven)
+            if not _may_stand(ground, shape, at_x, at_y):
+                return False
+            room = nearness(ground.clearance, at_x, at_y)[0] - shape.inscribed
+            at += max(room, 1.0)
+        x, y, yaw = along(x, y, yaw, curvatures[i], lengths[i])
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _may_stand(ground: Ground, shape: Shape, x: float, y: float) -> bool:
+    """Whether the largest disc about base_link within the footprint may be clear at a place."""
+    if not within(ground.clearance, x, y, 0.0):
+        return False
+    if nearness(ground.clearance, x, y)[1] < shape.inscribed - TOUCH:
+        return False
+    has_inside = shape.inscribed > TOUCH or len(shape.corners) == 0
+    return not (has_inside and ground.blocked[int(y), int(x)])
 
 
 @njit(cache=True, nogil=True)

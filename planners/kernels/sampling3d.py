@@ -109,6 +109,7 @@ def line_clear(
         if _nearness(squared, x + s * dx, y + s * dy, z + s * dz)[1] < least:
             return False
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
+    share = 1.0 / length if length > 0.0 else 0.0
     left = np.empty((HALVINGS, 2))  # parts of the line that are still to be looked at
     left[0, 0], left[0, 1] = 0.0, length
     count = 1
@@ -116,25 +117,17 @@ def line_clear(
         count -= 1
         begin, end = left[count]
         half, middle = (end - begin) / 2.0, (begin + end) / 2.0
-        s = middle / length if length > 0.0 else 0.0
+        s = middle * share
         low, high = _nearness(squared, x + s * dx, y + s * dy, z + s * dz)
         if high < least:
             return False
         room = low - need
-        if room >= half and room >= 0.0:
+        if room >= half:
             continue
         if end - begin <= PIECE:
-            s, t = (begin / length, end / length) if length > 0.0 else (0.0, 0.0)
-            if not _piece_clear(
-                squared,
-                x + s * dx,
-                y + s * dy,
-                z + s * dz,
-                (t - s) * dx,
-                (t - s) * dy,
-                (t - s) * dz,
-                least,
-            ):
+            s, t = begin * share, (end - begin) * share
+            u, v, w = x + s * dx, y + s * dy, z + s * dz
+            if not _piece_clear(squared, u, v, w, t * dx, t * dy, t * dz, least):
                 return False
             continue
         if room < NEAR:
@@ -153,8 +146,14 @@ def _within(squared: Ints32, x: float, y: float, z: float) -> bool:
 
 @njit(cache=True, nogil=True)
 def _nearness(squared: Ints32, x: float, y: float, z: float) -> tuple[float, float]:
-    """Return bounds of the clearance at a point on the map, from that at its voxel's centre."""
-    col, row, layer = math.floor(x), math.floor(y), math.floor(z)
+    """Return bounds of the clearance at a point, from that at its voxel's centre.
+
+    Points that rounding moved off the map are told of from the nearest voxel.
+    """
+    layers, rows, cols = squared.shape
+    col = min(max(math.floor(x), 0), cols - 1)
+    row = min(max(math.floor(y), 0), rows - 1)
+    layer = min(max(math.floor(z), 0), layers - 1)
     at = squared[layer, row, col]
     u, v, w = x - col - 0.5, y - row - 0.5, z - layer - 0.5
     off = math.sqrt(u * u + v * v + w * w)

@@ -13,9 +13,8 @@ import numpy as np
 from numba import njit
 
 from groundmap.arrays import Bytes, Floats
-from planners.kernels.curves import wrap
-from planners.kernels.footprint import Shape
-from planners.kernels.hybrid import driven
+from planners.kernels.curves import along, wrap
+from planners.kernels.footprint import Shape, cuts
 from planners.kernels.sampling import comes_later, curve_motions
 from planners.kernels.shortcut import leg_cost
 
@@ -108,17 +107,41 @@ def curve_cost(
     if not forward and comes_later(ax, ay, a, bx, by, b):
         ax, ay, a, bx, by, b = bx, by, b, ax, ay, a
     curvatures, lengths = curve_motions(forward, numbers, ax, ay, a, bx, by, b)
+    shape = _shape(numbers)
+    x, y, yaw = ax / numbers[SIZE], ay / numbers[SIZE], a
     total = 0.0
     for i in range(len(lengths)):
-        length = abs(lengths[i])
-        total += max(prices[DRIVE] * length, prices[TURN] * abs(curvatures[i]) * length)
-    start = np.array([ax / numbers[SIZE], ay / numbers[SIZE], a])
-    poses = driven(_shape(numbers), start, curvatures, lengths)
-    for j in range(1, len(poses)):
-        from_x, from_y, to_x, to_y = poses[j - 1, 0], poses[j - 1, 1], poses[j, 0], poses[j, 1]
-        total += prices[LENGTH] * math.hypot(to_x - from_x, to_y - from_y)
+        curvature, length = curvatures[i], lengths[i]
+        turn = curvature * length
+        steps = cuts(shape, curvature, length) if turn != 0.0 else 1
+        chord = length if turn == 0.0 else 2.0 * math.sin(0.5 * turn / steps) / curvature
+        total += max(prices[DRIVE] * abs(length), prices[TURN] * abs(turn))
+        total += prices[LENGTH] * abs(chord) * steps
         if prices[COST] > 0.0:
-            total += prices[COST] * leg_cost(costs, from_x, from_y, to_x, to_y)
+            total += prices[COST] * _chords_cost(costs, x, y, yaw, chord, turn / steps, steps)
+        x, y, yaw = along(x, y, yaw, curvature, length)
+    return total
+
+
+@njit(cache=True, nogil=True)
+def _chords_cost(
+    costs: Bytes, x: float, y: float, yaw: float, chord: float, turn: float, steps: int
+) -> float:
+    """Return the length of chords that each turn by so much, times the cost of their cells."""
+    dx, dy = chord * math.cos(yaw + 0.5 * turn), chord * math.sin(yaw + 0.5 * turn)
+    cosine, sine = math.cos(turn), math.sin(turn)
+    rows, cols = costs.shape
+    total = 0.0
+    for _ in range(steps):
+        to_x, to_y = x + dx, y + dy
+        row, col = math.floor(y), math.floor(x)
+        within = 0 <= row < rows and 0 <= col < cols
+        if within and row == math.floor(to_y) and col == math.floor(to_x):
+            total += abs(chord) * costs[row, col]
+        else:
+            total += leg_cost(costs, x, y, to_x, to_y)
+        x, y = to_x, to_y
+        dx, dy = cosine * dx - sine * dy, sine * dx + cosine * dy
     return total
 
 

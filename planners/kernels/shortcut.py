@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from groundmap.arrays import Bools, Floats, Ints, Ints32
+from groundmap.arrays import Bools, Bytes, Floats, Ints, Ints32
 from planners.kernels.clearance import segment_clearance
 
 WORTH = 0.25  # [cells] a step that distances vouch for, if this long, saves an exact look
@@ -56,7 +56,7 @@ def keeps(
 
 
 @njit(cache=True, nogil=True)
-def leg_cost(factors: Floats, ax: float, ay: float, bx: float, by: float) -> float:
+def leg_cost(factors: Floats | Bytes, ax: float, ay: float, bx: float, by: float) -> float:
     """Return the length of the segment a-b, each part times the factor of the cell it is in.
 
     Parameters

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from planners.sampling.settings import setter_of
+from planners.sampling.settings import FIXED, setter_of
 
 LOG = logging.getLogger(__name__)
 
@@ -47,7 +47,8 @@ def samplers() -> dict[str, str]:
 
 def has_parameter(planner: str, name: str) -> bool:
     """Whether one of OMPL's planners has a parameter."""
-    return hasattr(getattr(ompl().geometric, samplers()[planner]), setter_of(name))
+    setters = getattr(ompl().geometric, samplers()[planner])
+    return (planner, name) not in FIXED and hasattr(setters, setter_of(name))
 
 
 @contextmanager

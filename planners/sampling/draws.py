@@ -58,7 +58,7 @@ class Draws:
         first: Iterable[Pose] = (),
     ) -> None:
         self.ways, self.size = ways, ways.costmap.window.resolution
-        self.cells = np.argwhere(region)[:, ::-1]  # x, y (, z)
+        self.cells, self.shape = np.flatnonzero(region), region.shape
         self.random = np.random.default_rng(seed)
         self.yaw_weight = yaw_weight
         self._first = iter(tuple(first))
@@ -87,10 +87,10 @@ class Draws:
 
     def _drawn(self) -> Iterator[Pose]:
         """Yield states in the cells of the region, evenly, and any yaw; clear or not."""
-        axes = self.cells.shape[1]
         while True:
-            cells = self.cells[self.random.integers(len(self.cells), size=BATCH)]
-            states = (cells + self.random.random((BATCH, axes))) * self.size
+            drawn = self.cells[self.random.integers(len(self.cells), size=BATCH)]
+            cells = np.column_stack(np.unravel_index(drawn, self.shape)[::-1])  # x, y (, z)
+            states = (cells + self.random.random(cells.shape)) * self.size
             if self.ways.space not in FLAT:
                 yaws = self.random.uniform(-math.pi, math.pi, BATCH)
                 states = np.column_stack([states, yaws])

@@ -5,19 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import count
 
-from groundmap.arrays import Bools
-from planners.engine import Clock
+from planners.engine import Cancel, Clock, Pose
 from planners.sampling.door import logged, ompl, samplers
 from planners.sampling.draws import Draws
 from planners.sampling.graph import Graph, graph_of
 from planners.sampling.settings import SamplingSettings
 from planners.sampling.states import drawing, edge_check, space_of
-from planners.sampling.turns import turn
+from planners.sampling.turns import Ending, turn
 from planners.sampling.ways import Ways, box_of
 
 
 def grown(
-    planner: str, ways: Ways, region: Bools, settings: SamplingSettings, clock: Clock
+    planner: str,
+    ways: Ways,
+    start: Pose,
+    settings: SamplingSettings,
+    *,
+    seconds: float,
+    cancel: Cancel | None,
 ) -> Graph:
     """Return a roadmap.
 
@@ -25,24 +30,35 @@ def grown(
     ----------
     planner : {"prm", "prmstar"}
     ways : Ways
-    region : ndarray of bool, shape (rows, cols)
-        Cells to draw samples from.
+    start : state
+        It grows over what can be reached from there.
     settings : SamplingSettings
-    clock : Clock
-        It grows until time is up, or until ``settings.iterations`` are used up.
+    seconds : float [s]
+        It grows for so long, or until ``settings.iterations`` are used up.
+    cancel : Cancel, optional
+        Once it is set, growth ends.
+
+    Raises
+    ------
+    CancelledError
+        That was before growth began, while another search ran.
     """
     base, geometric, util = ompl()
-    with turn(clock), logged():
+    region = ways.region(start)
+    # This check also compiles the kernels, if they are not: that is no time of growth.
+    first = [start] if ways.is_clear(*start, *start) else []
+    with turn(Clock(planner, None, Ending(cancel))), logged():
         util.RNG.setSeed(settings.seed + 1)  # 0 is refused
         box = box_of(region, ways.costmap.window.resolution)
         information = base.SpaceInformation(space_of(base, ways.space, box, settings))
         # Only clear states are drawn.
         information.setStateValidityChecker(base.AllValidStateValidityChecker(information))
         # The class is made here: one that outlives the growth is reported as a leak at exit.
-        check = edge_check(ways, count())
+        check = edge_check(ways, count(1), lambda: None)
         motions = type("Motions", (base.MotionValidator,), {"checkMotion": check})
         information.setMotionValidator(motions(information))
-        draws = Draws(ways, region, seed=settings.seed, yaw_weight=settings.yaw_weight)
+        seed, yaw_weight = settings.seed, settings.yaw_weight
+        draws = Draws(ways, region, seed=seed, yaw_weight=yaw_weight, first=first)
         information.setValidStateSamplerAllocator(drawing(base, draws, ways.space))
         information.setup()
         prm = getattr(geometric, samplers()[planner])(information)
@@ -51,7 +67,7 @@ def grown(
         prm.setProblemDefinition(base.ProblemDefinition(information))  # it crashes without one
         prm.setup()
         # Growing alone runs no threads, so the question whether to stop may be Python's.
-        stop = _stop(settings, clock)
+        stop = _stop(settings, Clock(planner, seconds, Ending(cancel)))
         prm.growRoadmapPtc(base.PlannerTerminationCondition(stop))
         return graph_of(base, prm, information, ways)
 

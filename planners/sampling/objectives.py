@@ -37,8 +37,11 @@ from planners.sampling.ways3d import Ways3D
 
 # Planners that compare costs while they search. OMPL doesn't tell: the others take an objective,
 # too, and never ask it. PRM and PRM* would, from a thread of their own, which waits for Python's
-# lock while the search that holds it waits for the thread.
+# lock while the search that holds it waits for the thread: it never ends.
 HEEDING = frozenset({"bfmt", "bitstar", "fmt", "informedrrtstar", "rrtstar", "sorrtstar"})
+# There, FMT asks for hundreds of thousands of costs between two looks at the clock, and its twin
+# can't plan at all.
+HEEDLESS_FORWARD = frozenset({"bfmt", "fmt"})
 
 
 class Objective:
@@ -56,12 +59,14 @@ class Objective:
     Attributes
     ----------
     is_native : bool
-        Whether the cheapest path is the shortest one, so that OMPL's own objective does. The cost
-        is then what OMPL calls the length, in metres, whatever these are weighted by: in "se2", a
-        radian counts as ``yaw_weight`` metres.
+        Whether the cheapest path is the shortest one, so that OMPL's own objective does. Its cost
+        is what OMPL calls the length, in metres: in "se2", a radian counts as ``yaw_weight`` of
+        them.
     edge, least : callable
-        Take the numbers of two states. What the edge between them costs; what no path between
-        them can cost less than.
+        Take the numbers of two states. What the edge between them costs, as OMPL counts; what no
+        path between them can cost less than.
+    scale : float
+        What OMPL's costs are multiplied by: 1, but for its own objective.
 
     Raises
     ------
@@ -109,7 +114,9 @@ class Objective:
             expected = "more than 0, as nothing else costs anything"
             raise SettingsError("length_weight", expected, "0")
         self.is_native = plain and not _turns_take_time(self.space, settings)
-        self._metre = 1.0  # what a metre costs at least
+        speed = settings.length_weight + settings.time_weight / settings.max_speed
+        self.scale = speed if self.is_native else 1.0
+        self._metre = self.scale  # what a metre costs at least
         if costmap is None:
             self.edge = self.least = _distance
         elif self.is_native:
@@ -121,7 +128,7 @@ class Objective:
 
     def cost(self, states: Sequence[Pose]) -> float:
         """Return what a path costs."""
-        return math.fsum(self.edge(*a, *b) for a, b in pairwise(states))
+        return self.scale * math.fsum(self.edge(*a, *b) for a, b in pairwise(states))
 
     def longest(self, cost: float) -> float:
         """Return how long a path is at most that costs so much [m]."""
@@ -135,9 +142,11 @@ class Objective:
         ProblemError
             It looks at lengths only; the sentence names those that don't.
         """
-        if not self.is_native and planner not in HEEDING:
-            expected = f"one that heeds costs and times: {', '.join(sorted(HEEDING))}"
-            raise ProblemError("planner", expected, repr(planner))
+        heeding = HEEDING - HEEDLESS_FORWARD if self.space == "dubins" else HEEDING
+        if not self.is_native and planner not in heeding:
+            expected = f"one that heeds costs and times in {self.space!r}"
+            hint = f"Take one of these: {', '.join(sorted(heeding))}."
+            raise ProblemError("planner", expected, repr(planner), hint=hint)
 
     def as_ompl(self, base: Any, information: Any) -> Any:
         """Return the objective as OMPL takes it."""

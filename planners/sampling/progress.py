@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from groundmap.arrays import Floats
 from planners.engine import Clock, Improvement, OnImproved
+
+UNTOLD: Floats = np.empty((0, 2))  # waypoints of a route that OMPL doesn't show yet
 
 
 class Progress:
@@ -31,7 +35,7 @@ class Progress:
         self.clock, self.tell = clock, tell
         self.cost, self.since, self.enough = math.inf, math.inf, False
 
-    def found(self, cost: float, waypoints: Floats | None = None) -> None:
+    def found(self, cost: float, waypoints: Floats = UNTOLD) -> None:
         """Take note of a route, and tell of it if it is better than those before."""
         if cost < self.cost:
             self._say(cost, waypoints)
@@ -44,9 +48,9 @@ class Progress:
         """Whether so much time has passed since the first route."""
         return self.clock.seconds - self.since >= seconds
 
-    def _say(self, cost: float, waypoints: Floats | None) -> None:
+    def _say(self, cost: float, waypoints: Floats) -> None:
         self.cost, self.since = cost, min(self.since, self.clock.seconds)
         if self.tell is not None and self.tell(
-            Improvement(cost, None, self.clock.seconds, waypoints)
+            Improvement(cost, math.inf, self.clock.seconds, waypoints)
         ):
             self.enough = True

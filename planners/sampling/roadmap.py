@@ -12,7 +12,7 @@ from groundmap.arrays import Floats, is_number
 from groundmap.errors import SettingsError
 from planners.answers import check_on_map, check_space
 from planners.costmap import Costmap
-from planners.engine import Cancel, Clock, Found, Pose
+from planners.engine import Cancel, Found, Pose
 from planners.errors import ProblemError, UnsolvedError
 from planners.problem import PlanningProblem
 from planners.route import Route
@@ -124,6 +124,8 @@ class Roadmap:
             A setting that roadmaps don't heed, or one out of its range.
         OutsideMapError, NonFreeError, UnknownSpaceError
             The start is no place for the footprint.
+        CancelledError
+            `cancel` was set before growth began.
         """
         ways, told = _ways_of(problem, planner, settings)
         if not (is_number(seconds) and seconds > 0):
@@ -132,8 +134,7 @@ class Roadmap:
             raise ProblemError("planner", "OMPL", "none", hint="pip install ompl.")
         start = tuple(map(float, problem.start))
         check_space(ways.costmap, "start", start, headings=ways.space not in FLAT)
-        region = ways.region(ways.state_of(start))
-        graph = grown(planner, ways, region, told, Clock(NAME, seconds, cancel))
+        graph = grown(planner, ways, ways.state_of(start), told, seconds=seconds, cancel=cancel)
         return cls(ways, graph, told)
 
     def plan(

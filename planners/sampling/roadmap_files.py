@@ -12,7 +12,9 @@ import numpy as np
 
 from groundmap.archive import read_archive, write_archive
 from groundmap.errors import FileFormatError
+from planners.answers import check_on_map
 from planners.costmap import Costmap
+from planners.errors import OutsideMapError
 from planners.problem import PlanningProblem
 from planners.sampling.graph import Graph
 from planners.sampling.settings import SamplingSettings
@@ -63,17 +65,18 @@ def read_roadmap(
     """
     header, arrays = read_archive(path, FORMAT, VERSION)
     try:
-        place, ground = tuple(map(float, header["cleared_at"])), header["ground"]
         graph = Graph(arrays["vertices"], arrays["edges"], arrays["weights"])
         settings = SamplingSettings(**header["settings"])
-        whole = _fits(graph, width=2 if settings.space == "r2" else 3)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        space, ground = header["settings"]["space"], header["ground"]
+        place = tuple(map(float, header["cleared_at"]))
+        cleared = place if problem.cleared_at is None else problem.cleared_at
+        asked = replace(problem, start=place, goal=place, cleared_at=cleared)
+    except (KeyError, TypeError, ValueError) as error:
         raise FileFormatError(path, "a whole roadmap", "one that lacks something") from error
-    if not whole:
+    if not _fits(graph, width=2 if space == "r2" else 3):
         raise FileFormatError(path, "a whole roadmap", "arrays that don't fit each other")
-    cleared = place if problem.cleared_at is None else problem.cleared_at
-    costmap = Costmap.of(replace(problem, start=place, goal=place, cleared_at=cleared))
-    if _digest(costmap) != ground:
+    costmap = _costmap_of(asked)
+    if costmap is None or _digest(costmap) != ground:
         raise FileFormatError(
             path,
             "a roadmap of this map and footprint",
@@ -81,6 +84,15 @@ def read_roadmap(
             hint="Grow another one.",
         )
     return graph, costmap, settings
+
+
+def _costmap_of(problem: PlanningProblem) -> Costmap | None:
+    """Return the costmap of a problem, or None if the map has no such place."""
+    try:
+        check_on_map(problem)
+    except OutsideMapError:
+        return None
+    return Costmap.of(problem)
 
 
 def _fits(graph: Graph, *, width: int) -> bool:

@@ -7,9 +7,7 @@ an edge in one call. Its answers are taken for what they are: only an exact solu
 from __future__ import annotations
 
 import math
-import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from itertools import count
 from typing import Any, NamedTuple
@@ -22,6 +20,8 @@ from planners.sampling.graph import Graph, graph_of
 from planners.sampling.objectives import Objective
 from planners.sampling.progress import Progress
 from planners.sampling.settings import FLAT, SamplingSettings, setter_of
+from planners.sampling.simplified import simplified
+from planners.sampling.sliced import guarded, in_slices
 from planners.sampling.states import (
     drawing,
     edge_check,
@@ -52,7 +52,10 @@ THREADED = ("prm", "prmstar")  # they ask from threads of their own whether to s
 # They take no state but by an edge, and the check of an edge is one of its ends, too.
 BY_EDGES = ("informedrrtstar", "kpiece1", "rrt", "rrtconnect", "rrtstar", "sorrtstar")
 GLANCE = 16  # questions whether to stop between two looks at the clock
-SLICE = 0.05  # [s] these are stopped that often, to look whether to
+# [s] after time is up, a planner that has not asked is stopped in an edge's check, without a route
+# and with one, which is lost then.
+LATE, LATE_WITH_ROUTE = 0.1, 0.5
+ROUNDING = 1e-9  # relative, of costs
 SAMPLES = 1000  # that planners begin with which take all of their samples at first
 
 
@@ -84,20 +87,30 @@ class Outcome(NamedTuple):
     graph: Graph | None = None  #: the tree or roadmap, if it was to be kept
 
 
+class _LateError(Exception):
+    """Time is up, and the planner doesn't ask: thrown through it."""
+
+
 class Run:
     """One search: OMPL's objects are made for it, and gone after it."""
 
     def __init__(self, task: Task) -> None:
         self.task, self.ways, self.settings = task, task.ways, task.settings
         self.clock, self.progress = task.clock, task.progress
-        self.edges, self.looks = count(), 0
+        self.edges, self.looks, self.late = count(1), 0, math.inf
         self.read, self.ompl = reader(task.ways.space), ompl()
+        self.searching = task.name not in THREADED  # whose threads no exception may pass through
+        self.errors: list[BaseException] = []  # so they wait here
+        least = min(task.objective.least(*task.start, *goal) for goal in task.goals)
+        self.optimum = least * (1.0 + ROUNDING)  # in OMPL's costs
 
     def outcome(self) -> Outcome:
         """Search, and shorten what was found."""
         with logged():
             try:
                 return self._outcome()
+            except _LateError:
+                return Outcome("TIMEOUT", [], None, self._checked())
             except RuntimeError as error:  # what C++ throws arrives as that
                 return Outcome(f"OMPL says: {error}", [], None, self._checked())
 
@@ -112,7 +125,7 @@ class Run:
         planner.setProblemDefinition(definition)
         planner.setup()
         status = self._solved(planner, definition)
-        graph = None
+        self.searching, graph = False, None
         if self.settings.keep_graph:
             graph = graph_of(self.ompl.base, planner, information, self.ways)
         if not definition.hasSolution():
@@ -129,9 +142,10 @@ class Run:
         if task.name in BY_EDGES:
             information.setStateValidityChecker(base.AllValidStateValidityChecker(information))
         else:
-            information.setStateValidityChecker(state_check(self.ways))
+            is_clear = self._guarded(state_check(self.ways, self._look))
+            information.setStateValidityChecker(is_clear)
         # The class is made here: one that outlives the search is reported as a leak at exit.
-        check = edge_check(self.ways, self.edges)
+        check = self._guarded(edge_check(self.ways, self.edges, self._look))
         motions = type("Motions", (base.MotionValidator,), {"checkMotion": check})
         information.setMotionValidator(motions(information))
         draws = Draws(
@@ -144,6 +158,9 @@ class Run:
         information.setValidStateSamplerAllocator(drawing(base, draws, self.ways.space))
         information.setup()
         return information
+
+    def _guarded(self, check: Callable[..., bool]) -> Callable[..., bool]:
+        return guarded(check, self.errors) if self.task.name in THREADED else check
 
     def _definition(self, space: Any, information: Any) -> Any:
         """Return OMPL's problem: where from, where to, and what is best."""
@@ -160,15 +177,13 @@ class Run:
         """Return the planner's own parameters: what was told, and how far edges reach."""
         told = self.settings.parameters()
         if hasattr(planner, "setRange") and "range" not in told:
-            reach = getattr(self.ways, "reach", lambda *a: None)(self.task.region, self.task.room)
-            if reach is not None:
-                return told | {"range": reach}
+            return told | {"range": self.ways.reach(self.task.region, self.task.room)}
         return told
 
     def _solved(self, planner: Any, definition: Any) -> str:
         """Run a planner until it ends or is to; return its status."""
         if self.task.name in THREADED:
-            return self._solved_in_slices(planner, definition)
+            return in_slices(planner, definition, self.task, self.errors)
         grows = hasattr(planner, "setNumSamples") and self.settings.num_samples is None
         samples = SAMPLES
         while True:
@@ -181,46 +196,25 @@ class Run:
             samples *= 2
             planner.clear()
 
-    def _solved_in_slices(self, planner: Any, definition: Any) -> str:
-        """Run a planner whose threads no exception may pass through, nor any question to Python.
-
-        It is stopped by OMPL's own clock, in a thread that signals don't reach.
-        """
-        stopped = threading.Event()
-        costs: list[float] = []
-
-        def work() -> str:
-            while True:
-                status = _name_of(planner.solve(SLICE))
-                if status == EXACT:
-                    costs.append(float(definition.getSolutionPath().length()))
-                if (status == EXACT and self.task.name == "prm") or stopped.is_set():
-                    return status
-                if self.clock.is_up:
-                    return status
-
-        with ThreadPoolExecutor(1) as pool:
-            try:
-                ending = pool.submit(work)
-                while not wait([ending], timeout=SLICE).done:  # a wait without end hears no signal
-                    for cost in costs:
-                        self.progress.found(cost)
-                    if self.progress.enough or self.progress.has_had(self.settings.improve_for):
-                        stopped.set()
-                for cost in costs:
-                    self.progress.found(cost)
-                return ending.result()
-            finally:
-                stopped.set()
-
     def _checked(self) -> int:
         """Return how many edges were checked, once: asking counts."""
-        return next(self.edges)
+        return next(self.edges) - 1
 
     @property
     def _is_over(self) -> bool:
         iterations = self.settings.iterations
         return self.clock.is_up or (iterations is not None and self.looks >= iterations)
+
+    def _look(self) -> None:
+        """Stop a search from within that doesn't ask whether to.
+
+        RRTConnect joins its trees, BIT* draws a batch, FMT grows a neighbourhood in one go.
+        """
+        if self.searching and self.clock.is_up:
+            self.late = min(self.late, self.clock.seconds)
+            patience = LATE_WITH_ROUTE if math.isfinite(self.progress.cost) else LATE
+            if self.clock.seconds >= self.late + patience:
+                raise _LateError
 
     def _stop(self, planner: Any) -> Callable[[], bool]:
         """Return what a planner asks time and again: whether to stop.
@@ -229,15 +223,17 @@ class Run:
         """
         counted = self.settings.iterations is not None
         betters, progress = hasattr(planner, "bestCost"), self.progress
-        over = False
+        scale, over = self.task.objective.scale, False
 
         def stop() -> bool:
             nonlocal over
             self.looks += 1
-            if not over and (counted or self.looks % GLANCE == 0):
+            if betters:  # SORRT* looks for ever for what is better than the best there can be
+                over = over or planner.bestCost().value() <= self.optimum
+            if not over and (counted or self.looks % GLANCE == 0 or self.late < math.inf):
                 over = self._is_over
                 if betters and math.isfinite(cost := planner.bestCost().value()):
-                    progress.found(cost)
+                    progress.found(scale * cost)
                     bettered = not counted and progress.has_had(self.settings.improve_for)
                     over = over or progress.enough or bettered
             return over
@@ -250,15 +246,9 @@ class Run:
         if not self.ways.are_clear(states):
             reason = "its path can't be driven"
             return Outcome(reason, [], None, self._checked(), graph)
-        cost = self.task.objective.cost(states)
-        self.progress.found(cost)
+        self.progress.found(self.task.objective.cost(states))
         if self.settings.simplify and len(states) > 2:
-            trial = self.ompl.geometric.PathGeometric(path)
-            until = self.ompl.base.PlannerTerminationCondition(lambda: self.clock.is_up)
-            self.ompl.geometric.PathSimplifier(information).simplify(trial, until)
-            simpler = self._joined(trial)
-            if self.task.objective.cost(simpler) < cost and self.ways.are_clear(simpler):
-                states = simpler
+            states = simplified(states, self.ways, self.task.objective, self.clock)
         return Outcome(EXACT, states, 0.0, self._checked(), graph)
 
     def _joined(self, path: Any) -> list[Pose]:

@@ -23,12 +23,15 @@ from planners.sampling.objectives import Objective
 from planners.sampling.progress import Progress
 from planners.sampling.run import EXACT, REASONS, THREADED, Outcome, Run, Task
 from planners.sampling.settings import FLAT, SamplingSettings, Space, refusal
-from planners.sampling.turns import turn
+from planners.sampling.turns import Ending, turn
 from planners.sampling.warm import better_region, first_states
 from planners.sampling.ways import Ways, box_of
 from planners.sampling.ways3d import Ways3D
 from planners.voxels import Voxels
 from planners.wording import Place
+
+# With several goals, BFMT crashes, and PRM's threads wait for each other.
+ONE_GOAL = ("bfmt", "prm", "prmstar")
 
 
 class Sampler:
@@ -86,12 +89,13 @@ class Sampler:
         TimeLimitError, CancelledError
             Time ran out, or somebody set `cancel`; with a limit of 0, always.
         """
-        clock = Clock(self.name, settings.time_limit, cancel)
-        clock.check(0)
         ways = self._ways_for(start, goal, settings)
         self._check(ways.space, settings)
         objective = Objective(ways, settings)
         objective.check(self.name)
+        _compile(ways, objective)
+        clock = Clock(self.name, settings.time_limit, Ending(cancel))
+        clock.check(0)
         progress = Progress(clock, on_improved)
         task = self._task(ways, (start, goal), settings, progress, objective=objective)
         if task is None:
@@ -123,6 +127,12 @@ class Sampler:
         if self.name in THREADED and settings.iterations is not None:
             reason = "It runs threads, which no count stops: use time_limit."
             raise SettingsError("iterations", f"none for {self.name!r}", "a count", hint=reason)
+        if self.name in ONE_GOAL and settings.takes_other_goals:
+            expected = f"one place, which is all that {self.name!r} plans to"
+            raise SettingsError("goals", expected, "more", hint="Take 'rrtconnect' or 'fmt'.")
+        if self.name == "bitstar" and settings.keep_graph:
+            reason = "OMPL would never free it: take 'rrtstar'."
+            raise SettingsError("keep_graph", "False for 'bitstar'", "True", hint=reason)
         for name in settings.parameters():
             if not has_parameter(self.name, name):
                 raise SettingsError(name, f"a parameter that {self.name!r} has", "another's")
@@ -179,7 +189,7 @@ class Sampler:
         if task.progress.enough:
             return self._told(task, first, 0)
         size = self.costmap.window.resolution
-        longest = task.settings.longest(cost)
+        longest = task.objective.longest(cost)
         region = better_region(task.region, size, task.start, task.goals, longest)
         room = box_of(region, size)
         found = _alone_run(replace(task, region=region, room=room, first=first))
@@ -210,6 +220,13 @@ class Sampler:
         if settings.iterations is not None and found.status in ("TIMEOUT", "APPROXIMATE_SOLUTION"):
             reason = f"the goal was not reached in iterations = {settings.iterations}"
         return UnsolvedError(self.name, reason=reason, expanded=found.checked, left=found.left)
+
+
+def _compile(ways: Ways | Ways3D, objective: Objective) -> None:
+    """Compile what has to be, before time is counted."""
+    nowhere = (0.0,) * (2 if ways.space == "r2" else 3)
+    ways.is_clear(*nowhere, *nowhere)
+    objective.cost([nowhere, nowhere])
 
 
 def _alone_run(task: Task) -> Outcome:

@@ -27,8 +27,8 @@ class SamplingSettings(SearchSettings):
     space: Space | None = Field(
         None,
         description="r2 (places), se2 (poses, turning on the spot), dubins (forward, turning"
-        " radius), reeds_shepp (backwards too); none: se2 for an outline whose start and goal have"
-        " a yaw, else r2",
+        " radius), reeds_shepp (backwards too), r3 (on 3-D maps); none: se2 for an outline whose"
+        " start and goal have a yaw, else r2 or r3",
     )
     seed: int = Field(0, ge=0, lt=2**31, description="of the random numbers")
     iterations: int | None = Field(
@@ -87,14 +87,14 @@ class SamplingSettings(SearchSettings):
     rewire_factor: float | None = Field(
         None, ge=1, le=100, description="neighbourhood over the least that optimality needs"
     )
-    batch_size: int | None = Field(None, ge=1, le=10**7, description="of ordered sampling [states]")
-    samples_per_batch: int | None = Field(None, ge=1, le=10**7, description="[states]")
+    batch_size: int | None = Field(None, ge=1, le=10**4, description="of ordered sampling [states]")
+    samples_per_batch: int | None = Field(None, ge=1, le=10**5, description="[states]")
     num_samples: int | None = Field(
-        None, ge=1, le=10**7, description="samples [states]; none: more and more, from 1000 on"
+        None, ge=1, le=10**6, description="samples [states]; none: more and more, from 1000 on"
     )
-    num_sampling_attempts: int | None = Field(None, ge=1, le=10**7, description="for one sample")
+    num_sampling_attempts: int | None = Field(None, ge=1, le=10**4, description="for one sample")
     radius_multiplier: float | None = Field(
-        None, gt=0, le=100, description="neighbourhood over the least that optimality needs"
+        None, ge=1, le=5, description="neighbourhood over the least that optimality needs"
     )
     free_space_volume: float | None = Field(
         None, gt=0, description="of what is free, at most [m²; in se2 m² rad]"
@@ -122,7 +122,6 @@ class SamplingSettings(SearchSettings):
     sample_rejection: bool | None = Field(None, description="the same, by rejection")
     new_state_rejection: bool | None = Field(None, description="reject states that can't help")
     admissible_cost_to_come: bool | None = Field(None, description="bound by straight lines")
-    ordered_sampling: bool | None = Field(None, description="take promising samples first")
     focus_search: bool | None = Field(None, description="all of the above that narrow the search")
     k_nearest: bool | None = Field(None, description="neighbours by number, not by distance")
     use_k_nearest: bool | None = Field(None, description="neighbours by number, not by distance")
@@ -140,11 +139,6 @@ class SamplingSettings(SearchSettings):
         """Whether an outline is turned with the robot."""
         start, goal = tuple(map(float, problem.start)), tuple(map(float, problem.goal))
         return self.space_for(problem.shape, start, goal, axes=problem.grid.ndim) not in FLAT
-
-    def longest(self, cost: float) -> float:
-        """Return how long a path is at most that costs so much [m]."""
-        metre = self.length_weight + self.time_weight / self.max_speed
-        return cost / metre if metre > 0 else math.inf
 
     @property
     def takes_other_goals(self) -> bool:
@@ -182,7 +176,10 @@ def setter_of(name: str) -> str:
     return f"set{''.join(words)}"
 
 
-ONE_WAY = "It also follows edges backwards, which can't be driven: take 'rrtconnect' or 'bitstar'."
+ONE_WAY = "It also follows edges backwards, which can't be driven: take 'rrt' or 'bitstar'."
+ENDLESS = "It may look for a better sample for ever: take 'informedrrtstar'."
+# Switches that a planner inherits and dies of.
+FIXED = {("sorrtstar", name) for name in ("focus_search", "informed_sampling", "sample_rejection")}
 # What ends the process, or brings paths that can't be driven: tools/try_samplers.py tries them all.
 REFUSED: dict[tuple[str, Space | None], str] = {
     ("aorrtc", None): "OMPL's AORRTC crashes: take 'bitstar'.",
@@ -191,6 +188,9 @@ REFUSED: dict[tuple[str, Space | None], str] = {
     ("lbkpiece1", "dubins"): ONE_WAY,
     ("prm", "dubins"): ONE_WAY,
     ("prmstar", "dubins"): ONE_WAY,
+    ("sorrtstar", "se2"): ENDLESS,
+    ("sorrtstar", "dubins"): ENDLESS,
+    ("sorrtstar", "reeds_shepp"): ENDLESS,
 }
 
 

@@ -6,6 +6,7 @@ What is called back returns Python's own bool, and keeps no state: OMPL frees th
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import count
 from typing import Any
 
 from planners.engine import Pose
@@ -13,6 +14,8 @@ from planners.sampling.draws import Draws
 from planners.sampling.settings import FLAT, SamplingSettings, Space
 from planners.sampling.ways import Bounds, Ways
 from planners.sampling.ways3d import Ways3D
+
+OFTEN = 256  # checks between two looks
 
 
 def space_of(base: Any, space: Space, room: Bounds, settings: SamplingSettings) -> Any:
@@ -50,26 +53,40 @@ def goal_of(base: Any, information: Any, goals: list[Any]) -> Any:
     return goal
 
 
-def state_check(ways: Ways | Ways3D) -> Callable[[Any], bool]:
-    """Return what tells whether a state is clear."""
-    is_clear, read = ways.is_clear, reader(ways.space)
-    return lambda state: is_clear(*2 * read(state))
+def state_check(ways: Ways | Ways3D, look: Callable[[], None]) -> Callable[[Any], bool]:
+    """Return what tells whether a state is clear, and looks around now and then."""
+    is_clear, read, states = ways.is_clear, reader(ways.space), count(1)
+
+    def check(state: Any) -> bool:
+        if not next(states) % OFTEN:
+            look()
+        return is_clear(*2 * read(state))
+
+    return check
 
 
-def edge_check(ways: Ways | Ways3D, edges: Iterator[int]) -> Callable[..., bool]:
-    """Return a method that checks an edge and counts it; OMPL's third argument stays as it is."""
+def edge_check(
+    ways: Ways | Ways3D, edges: Iterator[int], look: Callable[[], None]
+) -> Callable[..., bool]:
+    """Return a method that checks an edge and counts it, and looks around now and then.
+
+    OMPL's third argument stays as it is.
+    """
     is_clear = ways.is_clear
 
     def line(_: Any, a: Any, b: Any, __: Any = None) -> bool:
-        next(edges)
+        if not next(edges) % OFTEN:
+            look()
         return is_clear(a[0], a[1], b[0], b[1])
 
     def line_3d(_: Any, a: Any, b: Any, __: Any = None) -> bool:
-        next(edges)
+        if not next(edges) % OFTEN:
+            look()
         return is_clear(a[0], a[1], a[2], b[0], b[1], b[2])
 
     def poses(_: Any, a: Any, b: Any, __: Any = None) -> bool:
-        next(edges)
+        if not next(edges) % OFTEN:
+            look()
         return is_clear(a.getX(), a.getY(), a.getYaw(), b.getX(), b.getY(), b.getYaw())
 
     return {"r2": line, "r3": line_3d}.get(ways.space, poses)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import reduce
 
 import numpy as np
 
@@ -96,15 +97,21 @@ def better_region(
     --------
     >>> better_region(np.ones((5, 7), bool), 1.0, (1.5, 2.5), [(5.5, 2.5)], 4.0).astype(int)[:3]
     array([[0, 0, 0, 0, 0, 0, 0],
-           [1, 1, 1, 1, 1, 1, 1],
-           [1, 1, 1, 1, 1, 1, 1]])
+           [0, 1, 1, 1, 1, 1, 0],
+           [0, 1, 1, 1, 1, 1, 0]])
     """
-    axes = region.ndim
-    cells = np.argwhere(region)
-    centres = (cells[:, ::-1] + 0.5) * size
-    from_start = np.linalg.norm(centres - start[:axes], axis=1)
-    to_goal = np.min([np.linalg.norm(centres - goal[:axes], axis=1) for goal in goals], axis=0)
-    better = from_start + to_goal <= longest + math.sqrt(axes) * size
-    kept = np.zeros_like(region)
-    kept[tuple(cells[better].T)] = True
+    to_goal = reduce(np.minimum, (_away(region.shape, size, goal) for goal in goals))
+    ways = _away(region.shape, size, start) + to_goal
+    kept: Bools = region & (ways <= longest + math.sqrt(region.ndim) * size)
     return kept
+
+
+def _away(shape: tuple[int, ...], size: float, state: Pose) -> Floats:
+    """Return how far the centres of cells are from a state."""
+    squared = np.zeros((1,) * len(shape))
+    for axis, length in enumerate(shape):
+        gaps = (np.arange(length) + 0.5) * size - state[len(shape) - 1 - axis]
+        others = [k for k in range(len(shape)) if k != axis]
+        squared = squared + np.expand_dims(gaps**2, others)
+    away: Floats = np.sqrt(squared)
+    return away

@@ -15,21 +15,33 @@ from groundmap.arrays import Bools, Floats
 from planners.costmap import Costmap
 from planners.engine import Pose
 from planners.hybrid_parts import ground_of, shape_of
+from planners.kernels.addresses import WORDS
 from planners.kernels.curves import wrap
 from planners.kernels.footprint import Shape
 from planners.kernels.hybrid import driven
 from planners.kernels.sampling import (
     Body,
     comes_later,
-    curve_clear,
     curve_motions,
-    line_clear,
-    slide_clear,
     slide_steps,
+)
+from planners.kernels.sampling_at import (
+    dubins_clear_at,
+    line_clear_at,
+    reeds_shepp_clear_at,
+    slide_clear_at,
 )
 from planners.sampling.settings import TURNING, Space
 
 Bounds: TypeAlias = tuple[float, ...]  # low x, low y, high x, high y [m, corner]
+CHECKS: dict[str, Callable[..., bool]] = {
+    "r2": line_clear_at,
+    "se2": slide_clear_at,
+    "dubins": dubins_clear_at,
+    "reeds_shepp": reeds_shepp_clear_at,
+}
+REACH = 8.0  # how many times the mean clearance an edge is long, at most
+SHARE = 0.2  # of the extent of what is sampled: OMPL's own choice
 
 
 class Ways:
@@ -77,13 +89,7 @@ class Ways:
             *self.shape[:3],
             np.array([size, turning_radius / size, *self.shape[3:]]),
         )
-        if space == "r2":
-            disc = costmap.problem.radius / size
-            self.is_clear = partial(line_clear, ground.blocked, ground.clearance, size, disc)
-        elif space == "se2":
-            self.is_clear = partial(slide_clear, *self.body)
-        else:
-            self.is_clear = partial(curve_clear, space == "dubins", *self.body)
+        self.is_clear = _bound(CHECKS[space], self.body)
 
     def state_of(self, pose: Pose) -> Pose:
         """Return a pose [map] as a state."""
@@ -122,6 +128,15 @@ class Ways:
         return (
             box_of(region, self.costmap.window.resolution) if region[self.cell_of(goal)] else None
         )
+
+    def reach(self, region: Bools, room: Bounds) -> float:
+        """Return how long edges should be at most [m]: so long that many of them are clear.
+
+        That is some times the mean clearance in a region, and no more than OMPL's own choice, which
+        knows nothing but the extent of what it samples.
+        """
+        extent = math.hypot(room[2] - room[0], room[3] - room[1])
+        return min(REACH * float(self.costmap.clearance[region].mean()), SHARE * extent)
 
     def poses(self, states: Sequence[Pose]) -> Floats:
         """Return the poses of base_link along a path, shape (n, 2) or (n, 3) [m, map; rad].
@@ -163,8 +178,19 @@ def box_of(region: Bools, size: float) -> Bounds:
     >>> box_of(np.eye(4, dtype=bool)[1:3], 0.5)
     (0.5, 0.0, 1.5, 1.0)
     """
-    lows, highs = zip(*((at.min(), at.max() + 1) for at in np.nonzero(region)[::-1]), strict=True)
-    return tuple(size * float(edge) for edge in (*lows, *highs))
+    axes = range(region.ndim)[::-1]
+    lines = [np.flatnonzero(region.any(axis=tuple(k for k in axes if k != axis))) for axis in axes]
+    edges = [line[0] for line in lines] + [line[-1] + 1 for line in lines]
+    return tuple(size * float(edge) for edge in edges)
+
+
+def _bound(check: Callable[..., bool], body: Body) -> Callable[..., bool]:
+    """Return a check that is told once where the arrays are which it reads."""
+    arrays = [np.ascontiguousarray(array) for array in body]
+    table = np.array([(array.ctypes.data, *array.shape, 1)[:WORDS] for array in arrays])
+    bound = partial(check, table.ctypes.data)
+    vars(bound)["kept"] = table, arrays  # an address alone keeps nothing
+    return bound
 
 
 def _curve(numbers: Floats, shape: Shape, a: Pose, b: Pose, *, forward: bool) -> Floats:

@@ -16,7 +16,7 @@ from planners.kernels.distance import NOWHERE
 from planners.kernels.sampling3d import SLACK, all_squared_distances, line_clear
 from planners.polyline import length_of
 from planners.sampling.settings import Space
-from planners.sampling.ways import Bounds, box_of
+from planners.sampling.ways import REACH, SHARE, Bounds, box_of
 from planners.voxels import Voxels
 
 ROUNDING = 1e-12  # relative error granted to distances
@@ -101,6 +101,12 @@ class Ways3D:
         if first == 0 or first != self._part_of(goal):
             return None
         return box_of(self._parts == first, self.voxels.window.resolution)
+
+    def reach(self, region: Bools, room: Bounds) -> float:
+        """Return how long edges should be at most [m], as `Ways.reach` does."""
+        extent = math.dist(room[:3], room[3:])
+        halves = float(np.sqrt(self.squared[region]).mean())
+        return min(REACH * 0.5 * halves * self.voxels.window.resolution, SHARE * extent)
 
     def apart(self, a: Pose, b: Pose) -> float:
         """Return how far two states are apart [m]."""

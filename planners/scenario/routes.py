@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -20,7 +20,12 @@ from planners.scenario.simulated import Simulated
 FINE = 0.05  # [m], cells of the true world's map
 OUTCOME = "route"  # what is expected where no error is
 # Of the best route.
-IN_TRUTH = {"planner": "astar", "settings": {}, "unknown": "avoid", "time_limit": None}
+IN_TRUTH: dict[str, Any] = {
+    "planner": "astar",
+    "settings": {},
+    "unknown": "avoid",
+    "time_limit": None,
+}
 
 
 class Answer(NamedTuple):

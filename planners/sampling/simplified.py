@@ -1,0 +1,106 @@
+"""Paths of OMPL's planners, made cheaper: the cheapest way over places along them."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from groundmap.arrays import Floats
+from planners.engine import Clock, Pose
+from planners.kernels.curves import wrap
+from planners.sampling.objectives import Objective
+from planners.sampling.settings import TURNING
+from planners.sampling.ways import Ways
+from planners.sampling.ways3d import Ways3D
+
+PLACES = 48  # along a path, beside its states
+WINDOW = 150  # of them that are tried as the one before
+ROUNDS = 6  # each with other places
+GAIN = 1e-3  # share of the cost below which another round is not worth it
+SHIFT = (math.sqrt(5.0) - 1.0) / 2.0  # of the places from round to round
+
+
+def simplified(
+    states: Sequence[Pose],
+    ways: Ways | Ways3D,
+    objective: Objective,
+    clock: Clock,
+) -> list[Pose]:
+    """Return a path that costs no more, from the same start to the same goal.
+
+    OMPL's own simplifier heeds lengths only, leaves out turns at places between states, and may
+    not end.
+
+    Parameters
+    ----------
+    states : sequence of states
+        A clear path.
+    ways : Ways or Ways3D
+    objective : Objective
+        What is to be small.
+    clock : Clock
+        Once time is up, the best so far is returned.
+    """
+    best, cost = list(states), objective.cost(states)
+    for turn in range(ROUNDS):
+        places = _with_places(ways, best, (turn + 1) * SHIFT % 1.0)
+        trial = _cheapest(places, ways, objective, clock)
+        before, after = cost, objective.cost(trial)
+        if after < before:
+            best, cost = trial, after
+        if after > (1.0 - GAIN) * before or clock.is_up:
+            break
+    return best
+
+
+def _cheapest(
+    places: list[Pose], ways: Ways | Ways3D, objective: Objective, clock: Clock
+) -> list[Pose]:
+    """Return the cheapest path from the first place to the last, onwards; in a hurry, all."""
+    edge, is_clear = objective.edge, ways.is_clear
+    costs, came = [0.0], [0]
+    for j in range(1, len(places)):
+        if clock.is_up:
+            return places
+        at, begin = places[j], max(0, j - WINDOW)
+        befores = [(costs[i] + edge(*places[i], *at), i) for i in range(begin, j)]
+        befores.sort()
+        clear = (before for before in befores if is_clear(*places[before[1]], *at))
+        cost, i = next(clear, (math.inf, j - 1))
+        costs.append(cost)
+        came.append(i)
+    last, path = len(places) - 1, [places[-1]]
+    while last > 0:
+        last = came[last]
+        path.append(places[last])
+    return path[::-1]
+
+
+def _with_places(ways: Ways | Ways3D, states: list[Pose], shift: float) -> list[Pose]:
+    """Return the states of a path, and places between them, about evenly along it."""
+    axes = 3 if ways.space == "r3" else 2
+    steps = [math.dist(a[:axes], b[:axes]) for a, b in pairwise(states)]
+    share = PLACES / max(sum(steps), sys.float_info.min)
+    places = []
+    for a, b, step in zip(states, states[1:], steps, strict=False):
+        count = round(step * share)
+        places += [a, *_between(ways, a, b, (np.arange(count) + shift) / max(count, 1))]
+    return [*places, states[-1]]
+
+
+def _between(ways: Ways | Ways3D, a: Pose, b: Pose, shares: Floats) -> list[Pose]:
+    """Return places along an edge, at shares of its length."""
+    if ways.space in TURNING:
+        poses = ways.poses([a, b])
+        poses[:, :2] -= ways.costmap.window.origin
+        places = poses[(shares * (len(poses) - 1)).astype(np.int64)]
+    else:
+        change = np.subtract(b, a)
+        if ways.space == "se2":
+            change[2] = wrap(change[2])
+        places = np.array(a) + shares[:, None] * change
+    return list(map(tuple, places.tolist()))

@@ -1,0 +1,90 @@
+"""What a check of motions is measured against, and what the measurement says."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from oracles_planning import BLOCKED, FREE, grid_of
+from planners.bench.motions import COMPILED, LAMBDA, REACH, compare_motions, lambda_of
+from planners.costmap import Costmap
+from planners.errors import ProblemError
+from planners.problem import PlanningProblem
+from planners.sampling.door import samplers
+from planners.sampling.ways import Ways
+
+needs_ompl = pytest.mark.skipif(not samplers(), reason="ompl is not installed")
+CAR = [(-0.5, -0.45), (1.0, -0.45), (1.0, 0.45), (-0.5, 0.45)]
+SIZE = 0.5  # [m] of a cell
+KEYS = {"workload", "system", "median_ms", "p95_ms", "ratio", "motions_per_s", "agree", "solved"}
+
+
+def walls() -> Any:
+    """Return two rooms of 16 x 16 m and a door of 4 m."""
+    field = np.full((32, 64), FREE, dtype=np.float32)
+    field[:12, 32] = field[20:, 32] = BLOCKED
+    return grid_of(field, resolution=SIZE)
+
+
+QUERIES = [((3.0, 3.0, 0.5), (29.0, 13.0, 1.0)), ((16.25, 1.0, 0.0), (29.0, 13.0, 1.0))]
+
+
+@needs_ompl
+@pytest.mark.parametrize(("footprint", "space"), [(0.0, "r2"), (0.6, "r2"), (CAR, "se2")])
+def test_a_lambda_and_the_compiled_check_mostly_agree(footprint: Any, space: str) -> None:
+    rows = compare_motions(walls(), footprint=footprint, queries=QUERIES, seeds=2)
+    assert all(set(row) == KEYS for row in rows)
+    motions = [row for row in rows if row["workload"] == f"motions, {space}"]
+    routes = [row for row in rows if row["workload"] == f"first route, {space}"]
+    assert [row["system"] for row in motions] == [LAMBDA, COMPILED]
+    assert [row["system"] for row in routes] == [LAMBDA, COMPILED, REACH]
+    assert motions[0]["ratio"] == routes[0]["ratio"] == 1.0
+    assert all(row["solved"] == 1.0 for row in routes)
+    for row in motions:
+        assert row["agree"] > 0.8
+        assert row["motions_per_s"] > 0.0
+
+
+class Posed:
+    """Reads as a state of OMPL's does."""
+
+    def __init__(self, *pose: float) -> None:
+        self.pose = pose
+
+    def __getitem__(self, axis: int) -> float:
+        return self.pose[axis]
+
+    def getX(self) -> float:  # noqa: N802
+        return self.pose[0]
+
+    def getY(self) -> float:  # noqa: N802
+        return self.pose[1]
+
+    def getYaw(self) -> float:  # noqa: N802
+        return self.pose[2]
+
+
+@pytest.mark.parametrize(("footprint", "space"), [(0.0, "r2"), (CAR, "se2")])
+def test_the_lambda_is_right_about_states(footprint: Any, space: Any) -> None:
+    problem = PlanningProblem(
+        walls(), start=QUERIES[0][0], goal=QUERIES[0][1], footprint=footprint, clear_start=False
+    )
+    ways = Ways(Costmap.of(problem), space, 1.0)
+    is_valid, rng = lambda_of(ways), np.random.default_rng(0)
+    high = np.array(ways.costmap.blocked.shape[::-1]) * SIZE
+    told = []
+    for _ in range(300):
+        state = (*rng.uniform(0.0, high).tolist(), rng.uniform(-math.pi, math.pi))
+        own = state[:2] if space == "r2" else state
+        told.append((is_valid(Posed(*state)), ways.is_clear(*own, *own)))
+        assert isinstance(told[-1][0], bool)
+    agree = np.mean([said == clear for said, clear in told])
+    assert agree >= (1.0 if space == "r2" else 0.95)  # a corner of a cell fits between two points
+
+
+def test_queries_that_have_no_route_are_not_measured() -> None:
+    with pytest.raises(ProblemError, match=r"queries: expected one that may have a route, got"):
+        compare_motions(walls(), footprint=0.0, queries=QUERIES[1:], seeds=1)

@@ -1,0 +1,127 @@
+"""Trees and roadmaps as arrays: what OMPL grew, checked against its own answers."""
+
+from __future__ import annotations
+
+import gc
+from itertools import count
+from typing import Any
+
+import numpy as np
+import pytest
+
+from oracles_planning import BLOCKED, FREE, grid_of
+from planners import PlanningProblem, SamplingSettings
+from planners.costmap import Costmap
+from planners.engine import Pose
+from planners.sampling.door import logged, ompl, samplers
+from planners.sampling.graph import Graph, graph_of
+from planners.sampling.settings import Space
+from planners.sampling.states import edge_check, reader, space_of, state_of
+from planners.sampling.ways import Ways
+
+CAR = [(-0.5, -0.45), (1.0, -0.45), (1.0, 0.45), (-0.5, 0.45)]
+SPACES: list[Space] = ["r2", "se2", "dubins", "reeds_shepp"]
+pytestmark = pytest.mark.skipif(not samplers(), reason="ompl is not installed")
+
+
+def ways_in(space: Space) -> Ways:
+    field = np.full((48, 48), FREE, dtype=np.float32)
+    field[:36, 24] = BLOCKED
+    grid = grid_of(field, resolution=0.25, origin=(-3.0, 7.0))
+    ends: dict[str, Any] = {"start": (0, 9, 0), "goal": (0, 9, 0)}
+    problem = PlanningProblem(grid, **ends, footprint=CAR, clear_start=False)
+    return Ways(Costmap.of(problem), space, 1.0)
+
+
+def searched(
+    name: str, ways: Ways, *, looks: int = 300
+) -> tuple[Graph, list[Pose], list[tuple[int, int]]]:
+    """Return what a planner grew in so many looks, and states and edges as OMPL lists them."""
+    base, geometric, util = ompl()
+    with logged():
+        util.RNG.setSeed(1)
+        begin, end = ways.state_of((0.0, 9.0, 0.0)), ways.state_of((6.0, 9.0, 1.0))
+        room = ways.room(begin, end)
+        assert room is not None
+        space = space_of(base, ways.space, room, SamplingSettings())
+        information = base.SpaceInformation(space)
+        read = reader(ways.space)
+        information.setStateValidityChecker(lambda state: ways.is_clear(*2 * read(state)))
+        check = edge_check(ways, count(1), lambda: None)
+        motions = type("Motions", (base.MotionValidator,), {"checkMotion": check})
+        information.setMotionValidator(motions(information))
+        information.setup()
+        definition = base.ProblemDefinition(information)
+        ends = (state_of(space, state, ways.space) for state in (begin, end))
+        definition.setStartAndGoalStates(*ends)
+        planner = getattr(geometric, name)(information)
+        planner.setProblemDefinition(definition)
+        planner.setup()
+        asked = count()
+        stop = base.PlannerTerminationCondition(lambda: next(asked) >= looks)
+        (planner.growRoadmapPtc if name == "PRM" else planner.solve)(stop)
+        graph = graph_of(base, planner, information, ways)
+        return graph, *_listed(base, planner, information, ways)
+
+
+def _listed(
+    base: Any, planner: Any, information: Any, ways: Ways
+) -> tuple[list[Pose], list[tuple[int, int]]]:
+    data = base.PlannerData(information)
+    planner.getPlannerData(data)
+    data.decoupleFromPlanner()
+    read, indices = reader(ways.space), range(data.numVertices())
+    states = [read(data.getVertex(i).getState()) for i in indices]
+    return states, [(a, b) for a in indices for b in indices if data.edgeExists(a, b)]
+
+
+@pytest.mark.parametrize("space", SPACES)
+@pytest.mark.parametrize("name", ["RRT", "RRTConnect", "RRTstar", "PRM"])
+def test_every_edge_that_ompl_has_is_there_once(name: str, space: Space) -> None:
+    if name == "PRM" and space == "dubins":
+        return
+    ways = ways_in(space)
+    graph, states, listed = searched(name, ways)
+    assert graph.vertices.shape == (len(states), 2 if space == "r2" else 3)
+    shifted = np.array(states)
+    shifted[:, :2] += ways.costmap.window.origin
+    np.testing.assert_array_equal(graph.vertices, shifted)
+    got = list(map(tuple, graph.edges.tolist()))
+    assert len(got) > 10
+    assert graph.weights.shape == (len(got),)
+    assert set(got) <= set(listed)
+    assert len({frozenset(edge) for edge in got}) == len(got)
+    assert {frozenset(edge) for edge in got} == {frozenset(edge) for edge in listed}
+    if name == "PRM":
+        assert 2 * len(got) == len(listed)
+
+
+@pytest.mark.parametrize("space", SPACES)
+def test_vertices_are_clear_places_on_the_map_and_edges_are_as_long_as_they_say(
+    space: Space,
+) -> None:
+    ways = ways_in(space)
+    graph, *_ = searched("RRT", ways)
+    states = [ways.state_of(tuple(vertex)) for vertex in graph.vertices.tolist()]
+    assert all(ways.is_clear(*state, *state) for state in states)
+    for (a, b), weight in zip(graph.edges.tolist(), graph.weights.tolist(), strict=True):
+        assert ways.is_clear(*states[a], *states[b])
+        length = ways.length([states[a], states[b]])
+        assert weight == pytest.approx(length, rel=0.02)  # chords of curves are a little shorter
+        assert weight >= length - 1e-9
+
+
+def test_a_planner_that_grew_nothing_is_a_graph_without_edges() -> None:
+    for space in SPACES:
+        graph, *_ = searched("PRM", ways_in(space), looks=1)
+        assert graph.edges.shape == (0, 2)
+        assert graph.weights.shape == (0,)
+        assert graph.vertices.shape[1] == (2 if space == "r2" else 3)
+
+
+def test_a_graph_outlives_all_that_is_of_ompl() -> None:
+    graph = searched("RRTConnect", ways_in("se2"))[0]
+    gc.collect()
+    for array in (graph.vertices, graph.edges, graph.weights):
+        assert array.base is None or isinstance(array.base, np.ndarray)
+        assert np.isfinite(array.sum())
