@@ -4,18 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 import shapely
 
-from groundmap.arrays import Bools, Floats, Ints
+from groundmap.arrays import Bools, Bytes, Floats, Ints
 from groundmap.window import CellState, GridWindow
 from planners.errors import AuditError
 from planners.problem import PlanningProblem
 
 TOLERANCE = 1e-9  # [m]
 PIECE = 16  # [cells] the line is cut into pieces of that length, to look at few cells around it
+MITRE = 5.0  # [bulges] sharp corners of grown areas are cut off that far out
+
+
+class Swept(NamedTuple):
+    """What holds all that a polygon covers between each two poses, once it is grown."""
+
+    hulls: npt.NDArray[np.object_]  #: shape (n,): of a convex part's places at either pose
+    bulges: Floats  #: shape (n,): by how much a turn makes a corner bulge out of that [m]
 
 
 def audit(problem: PlanningProblem, waypoints: Floats, *, headings: Floats | None = None) -> None:
@@ -51,19 +60,19 @@ def audit(problem: PlanningProblem, waypoints: Floats, *, headings: Floats | Non
     cells, states = cells[states != CellState.FREE], states[states != CellState.FREE]
     squares = _squares(window, cells)
     forbidden = _forbidden(problem, states, squares, tolerance)
-    names = np.array([CellState(state).name.lower() for state in states[forbidden]])
+    squares, states = squares[forbidden], states[forbidden]
     if headings is None or problem.shape.polygon is None:
-        _check_distance(problem.radius, line, squares[forbidden], names, tolerance)
+        _check_distance(problem.radius, line, squares, states, tolerance)
     else:
-        swept = swept_areas(problem.shape.polygon, waypoints, headings)
-        _check_swept(swept, squares[forbidden], names, tolerance)
+        swept = swept_hulls(problem.shape.polygon, waypoints, headings)
+        _check_swept(swept, squares, states, tolerance)
 
 
-def swept_areas(polygon: Floats, waypoints: Floats, headings: Floats) -> npt.NDArray[np.object_]:
-    """Return areas that hold what a polygon covers between each two poses.
+def swept_hulls(polygon: Floats, waypoints: Floats, headings: Floats) -> Swept:
+    """Return what holds all that a polygon covers between each two poses.
 
-    Of each convex part, the hull of its two places, grown by as much as a turn makes a corner
-    bulge out of a straight piece.
+    Of each convex part, the hull of its two places, to be grown by as much as a turn makes a
+    corner bulge out of a straight piece.
 
     Parameters
     ----------
@@ -73,7 +82,8 @@ def swept_areas(polygon: Floats, waypoints: Floats, headings: Floats) -> npt.NDA
 
     Returns
     -------
-    ndarray of shapely geometries, shape (parts · (m - 1),)
+    Swept
+        Of parts · (m - 1) hulls.
     """
     outline = shapely.Polygon(polygon)
     convex = outline.convex_hull.area - outline.area <= TOLERANCE**2
@@ -82,14 +92,13 @@ def swept_areas(polygon: Floats, waypoints: Floats, headings: Floats) -> npt.NDA
     turns = np.array([[cos, -sin], [sin, cos]]).transpose(2, 0, 1)
     turned = np.abs(np.angle(np.exp(1j * np.diff(headings))))
     bulges = np.hypot(*polygon.T).max() * (1.0 - np.cos(turned / 2.0))
-    areas = []
+    hulls = []
     for part in parts:
         corners = shapely.get_coordinates(part)[:-1]
         placed = np.einsum("mij,nj->mni", turns, corners) + waypoints[:, None]
         pairs = np.concatenate([placed[:-1], placed[1:]], axis=1)
-        hulls = shapely.convex_hull(shapely.multipoints(list(pairs)))
-        areas.append(shapely.buffer(hulls, bulges, join_style="mitre"))
-    return np.concatenate(areas)
+        hulls.append(shapely.convex_hull(shapely.linestrings(pairs)))
+    return Swept(np.concatenate(hulls), np.tile(bulges, len(parts)))
 
 
 def outline_parts(outline: shapely.Polygon) -> list[shapely.Geometry]:
@@ -133,11 +142,13 @@ def _line(waypoints: Floats) -> shapely.Geometry:
 def _cells_near(window: GridWindow, line: shapely.Geometry, reach: float) -> Ints:
     """Return the cells [row, col] in boxes around the pieces of the line."""
     points = shapely.get_coordinates(shapely.segmentize(line, PIECE * window.resolution))
+    count = max(len(points) - 1, 1)
+    a, b = points[:count], points[-count:]
+    first = np.maximum(window.world_to_cell(np.minimum(a, b) - reach), 0)
+    last = window.world_to_cell(np.maximum(a, b) + reach)
     near = np.zeros(window.count.shape, dtype=np.bool_)
-    for a, b in zip(points, points[1:] if len(points) > 1 else points, strict=False):
-        first = window.world_to_cell(np.minimum(a, b) - reach)[0]
-        last = window.world_to_cell(np.maximum(a, b) + reach)[0]
-        near[tuple(map(slice, np.maximum(first, 0), last + 1))] = True
+    for (row, col), (end_row, end_col) in zip(first.tolist(), (last + 1).tolist(), strict=True):
+        near[row:end_row, col:end_col] = True
     return np.argwhere(near)
 
 
@@ -150,7 +161,7 @@ def _squares(window: GridWindow, cells: Ints) -> npt.NDArray[np.object_]:
 
 def _forbidden(
     problem: PlanningProblem,
-    states: npt.NDArray[np.uint8],
+    states: Bytes,
     squares: npt.NDArray[np.object_],
     tolerance: float,
 ) -> Bools:
@@ -168,7 +179,7 @@ def _check_distance(
     radius: float,
     line: shapely.Geometry,
     squares: npt.NDArray[np.object_],
-    names: npt.NDArray[np.str_],
+    states: Bytes,
     tolerance: float,
 ) -> None:
     tree = shapely.STRtree(squares)
@@ -178,25 +189,35 @@ def _check_distance(
         inside = shapely.buffer(squares[i], -tolerance, join_style="mitre")
         if distance < radius - tolerance or shapely.relate_pattern(line, inside, "T********"):
             nearest = shapely.get_coordinates(shapely.shortest_line(line, squares[i]))[0]
-            fault = f"comes too near to a {names[i]} cell"
+            fault = f"comes too near to a {_name(states[i])} cell"
             place = (float(nearest[0]), float(nearest[1]))
             raise AuditError(fault, place, got=distance, needed=radius)
 
 
 def _check_swept(
-    swept: npt.NDArray[np.object_],
+    swept: Swept,
     squares: npt.NDArray[np.object_],
-    names: npt.NDArray[np.str_],
+    states: Bytes,
     tolerance: float,
 ) -> None:
-    shrunk = shapely.buffer(squares, -tolerance, join_style="mitre")
-    tree = shapely.STRtree(shrunk)
-    hits = tree.query(swept, predicate="intersects")
+    low, high = np.split(shapely.bounds(squares), 2, axis=1)
+    shrunk = shapely.box(*(low + tolerance).T, *(high - tolerance).T)
+    # To grow hulls takes longest, so only those are grown that then may reach a square: by more
+    # than a mitre is long, as one that is cut off is wider than its middle.
+    reach = (MITRE + 1.0) * swept.bulges + tolerance
+    hull, square = shapely.STRtree(shrunk).query(swept.hulls, predicate="dwithin", distance=reach)
+    areas = shapely.buffer(
+        swept.hulls[hull], swept.bulges[hull], join_style="mitre", mitre_limit=MITRE
+    )
+    hits = np.flatnonzero(shapely.intersects(areas, shrunk[square]))
     if hits.size:
-        area, square = hits[:, 0]
-        overlap = shapely.intersection(swept[area], shrunk[square])
+        area, hit = areas[hits[0]], square[hits[0]]
+        overlap = shapely.intersection(area, shrunk[hit])
         x, y = shapely.get_coordinates(shapely.point_on_surface(overlap))[0].tolist()
         covered = float(shapely.area(overlap))
-        raise AuditError(
-            f"sweeps a {names[square]} cell", (x, y), got=covered, needed=0.0, unit="m²"
-        )
+        fault = f"sweeps a {_name(states[hit])} cell"
+        raise AuditError(fault, (x, y), got=covered, needed=0.0, unit="m²")
+
+
+def _name(state: np.uint8) -> str:
+    return CellState(state).name.lower()

@@ -106,23 +106,45 @@ def crossed(points: Floats) -> Crossed:
            [0, 1],
            [0, 2]]), lengths=array([0.5, 1. , 0.5]))
     """
-    pieces = [_crossed_piece(a, b) for a, b in pairwise(points)]
-    cells = np.concatenate([piece.cells for piece in pieces])
-    lengths = np.concatenate([piece.lengths for piece in pieces])
+    starts, steps = points[:-1], np.diff(points, axis=0)
+    pieces, shares = _cuts(starts, points[1:])
+    gaps = np.diff(shares)
+    apart = (pieces[:-1] == pieces[1:]) & (gaps > 0)
+    pieces, gaps, middles = pieces[:-1][apart], gaps[apart], ((shares[:-1] + shares[1:]) / 2)[apart]
+    places = starts[pieces] + middles[:, None] * steps[pieces]
+    cells = np.floor(places).astype(np.int64)[:, ::-1]
+    lengths = gaps * np.sqrt(np.vecdot(steps, steps))[pieces]
     inside = lengths > 0
     if not inside.any():
         return Crossed(cells[:1], lengths[:1])
     return Crossed(cells[inside], lengths[inside])
 
 
-def _crossed_piece(a: Floats, b: Floats) -> Crossed:
-    cuts = [np.array([0.0, 1.0])]
-    for start, end in zip(a.tolist(), b.tolist(), strict=True):
-        low, high = sorted((start, end))
-        borders = np.arange(np.ceil(low), np.floor(high) + 1.0)
-        if start != end:
-            cuts.append(np.clip((borders - start) / (end - start), 0.0, 1.0))
-    t = np.unique(np.concatenate(cuts))
-    middles = a + ((t[:-1] + t[1:]) / 2.0)[:, None] * (b - a)
-    cells = np.floor(middles).astype(np.int64)[:, ::-1]
-    return Crossed(cells, np.diff(t) * np.linalg.norm(b - a))
+def _cuts(starts: Floats, ends: Floats) -> tuple[Ints, Floats]:
+    """Return where straight pieces begin, meet the borders of cells and end.
+
+    Parameters
+    ----------
+    starts, ends : ndarray, shape (n, d) [cells]
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        Which piece, in order.
+    ndarray, shape (m,)
+        Share of the piece up to there, in order; the same share may come more than once.
+    """
+    numbers = np.arange(len(starts))
+    pieces, shares = [numbers, numbers], [np.zeros(len(starts)), np.ones(len(starts))]
+    for start, end in zip(starts.T, ends.T, strict=True):
+        first = np.ceil(np.minimum(start, end))
+        count = np.floor(np.maximum(start, end)) - first + 1.0
+        counts = np.where(start == end, 0, count).astype(np.int64)
+        piece = np.repeat(numbers, counts)
+        nth = np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts)
+        pieces.append(piece)
+        away = first[piece] + nth - start[piece]
+        shares.append(np.clip(away / (end - start)[piece], 0.0, 1.0))
+    which, share = np.concatenate(pieces), np.concatenate(shares)
+    order = np.lexsort((share, which))
+    return which[order], share[order]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -84,7 +83,7 @@ def _with_places(ways: Ways | Ways3D, states: list[Pose], shift: float) -> list[
     """Return the states of a path, and places between them, about evenly along it."""
     axes = 3 if ways.space == "r3" else 2
     steps = [math.dist(a[:axes], b[:axes]) for a, b in pairwise(states)]
-    share = PLACES / max(sum(steps), sys.float_info.min)
+    share = PLACES / sum(steps) if any(steps) else 0.0
     places = []
     for a, b, step in zip(states, states[1:], steps, strict=False):
         count = round(step * share)
