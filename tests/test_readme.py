@@ -13,6 +13,7 @@ import pytest
 from groundmap import fit_ground, read_views
 from planners import OWN_PLANNERS
 from planners.cli import app
+from planners.sampling.door import samplers
 
 README = Path(__file__).parents[1] / "README.md"
 pytestmark = pytest.mark.skipif(not README.is_file(), reason="README.md is not beside the tests")
@@ -33,17 +34,19 @@ def examples() -> list[tuple[str, str]]:
     return re.findall(r"```python\n(.*?)```\s+```\n(.*?)```", text, re.DOTALL)
 
 
-@pytest.mark.parametrize(("code", "answer"), examples(), ids=["first", "planners"])
+@pytest.mark.parametrize(("code", "answer"), examples(), ids=["first", "planners", "sampling"])
 def test_an_example_prints_its_answer(code: str, answer: str) -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == answer
 
 
 def test_every_planner_is_in_the_table() -> None:
-    _, _, section = README.read_text(encoding="utf-8").partition("| planner |")
-    rows = section.partition("\n\n")[0]
-    listed = re.findall(r"`([^`]+)`", "\n".join(row.split("|")[1] for row in rows.split("\n")[2:]))
-    assert sorted(listed) == sorted(OWN_PLANNERS)
+    _, *tables = README.read_text(encoding="utf-8").split("| planner |")
+    listed = [
+        re.findall(r"`([^`]+)`", "\n".join(row.split("|")[1] for row in rows.split("\n")[2:]))
+        for rows in (table.partition("\n\n")[0] for table in tables)
+    ]
+    assert [sorted(names) for names in listed] == [sorted(OWN_PLANNERS), sorted(samplers())]
 
 
 def test_the_first_example_has_ten_lines_at_most() -> None:
