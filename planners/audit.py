@@ -200,24 +200,23 @@ def _check_swept(
     states: Bytes,
     tolerance: float,
 ) -> None:
-    low, high = np.split(shapely.bounds(squares), 2, axis=1)
-    shrunk = shapely.box(*(low + tolerance).T, *(high - tolerance).T)
-    # To grow hulls takes longest, so only those are grown that then may reach a square: by more
-    # than a mitre is long, as one that is cut off is wider than its middle.
-    reach = (MITRE + 1.0) * swept.bulges + tolerance
-    hull, square = shapely.STRtree(shrunk).query(swept.hulls, predicate="dwithin", distance=reach)
-    areas = shapely.buffer(
-        swept.hulls[hull], swept.bulges[hull], join_style="mitre", mitre_limit=MITRE
-    )
-    hits = np.flatnonzero(shapely.intersects(areas, shrunk[square]))
+    # To grow hulls takes longest, so only those are grown that may then reach a square. A mitre
+    # that is cut off ends in an edge, whose ends are farther out than its middle.
+    reach = (MITRE + 1.0) * swept.bulges
+    hull, square = shapely.STRtree(squares).query(swept.hulls, predicate="dwithin", distance=reach)
+    hulls, bulges = swept.hulls[hull], swept.bulges[hull]
+    grown = shapely.buffer(hulls, bulges, join_style="mitre", mitre_limit=MITRE)
+    areas = shapely.union(hulls, grown)  # what is grown by a rounding error may come out empty
+    shrunk = shapely.buffer(squares[square], -tolerance, join_style="mitre")
+    hits = np.flatnonzero(shapely.intersects(areas, shrunk))
     if hits.size:
-        area, hit = areas[hits[0]], square[hits[0]]
-        overlap = shapely.intersection(area, shrunk[hit])
+        hit = hits[0]
+        overlap = shapely.intersection(areas[hit], shrunk[hit])
         x, y = shapely.get_coordinates(shapely.point_on_surface(overlap))[0].tolist()
         covered = float(shapely.area(overlap))
-        fault = f"sweeps a {_name(states[hit])} cell"
+        fault = f"sweeps a {_name(states[square[hit]])} cell"
         raise AuditError(fault, (x, y), got=covered, needed=0.0, unit="m²")
 
 
 def _name(state: np.uint8) -> str:
-    return CellState(state).name.lower()
+    return CellState(int(state)).name.lower()

@@ -275,6 +275,8 @@ def _mean(values: Floats, weights: Floats) -> float:
 
 
 def _start_unknown_area(space: Space, found: Found, line: Crossed) -> float:
+    if not space.cleared.any():
+        return 0.0
     centres = space.window.cell_to_world(np.argwhere(space.cleared))
     used = np.zeros_like(space.cleared)
     used[space.cleared] = _covered(space, found, centres)

@@ -7,12 +7,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+import shapely
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 
 from groundmap.arrays import Floats
 from groundmap.grid import ConfidenceGrid
 from oracles_planning import BLOCKED, FREE, UNSEEN, free_field, grid_of
 from planners import AuditError, NoRouteError, PlanningProblem, Route, plan
 from planners.audit import audit
+from strategies import rngs
 
 
 def cluttered(seed: int) -> ConfidenceGrid:
@@ -153,6 +157,36 @@ def test_an_outline_that_turns_into_an_obstacle_is_refused() -> None:
     waypoints, headings = drive(29.3, turn=0.3)
     with pytest.raises(AuditError, match="sweeps a nonfree cell"):
         audit(car_problem(CAR), waypoints, headings=headings)
+
+
+def placed(outline: list[tuple[float, float]], pose: Floats) -> shapely.Polygon:
+    x, y, yaw = pose.tolist()
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    return shapely.Polygon(np.array(outline) @ [[cos, sin], [-sin, cos]] + [x, y])
+
+
+@given(rngs(), st.sampled_from([CAR, HOOK]), st.floats(-2.5, 2.5))
+@settings(max_examples=60)
+def test_what_an_outline_sweeps_between_two_poses_is_refused(
+    rng: np.random.Generator, outline: list[tuple[float, float]], turn: float
+) -> None:
+    first = np.array([28.0, 30.0, rng.uniform(-1.5, 1.5)])
+    last = first + np.array([*rng.uniform(-1, 1, 2), turn])
+    between = [placed(outline, first + t * (last - first)) for t in np.linspace(0, 1, 100)]
+    assume(shapely.area(shapely.intersection(between, shapely.box(30, 30, 31, 31))).max() > 1e-6)
+    poses = np.array([first, last])
+    with pytest.raises(AuditError, match="sweeps a nonfree cell"):
+        audit(car_problem(outline, start=first, goal=last), poses[:, :2], headings=poses[:, 2])
+
+
+@pytest.mark.parametrize("y", [29.7, 30.0, 30.2, 30.4])
+@pytest.mark.parametrize("yaw", [-0.1, 0.0, 0.3])
+def test_a_turn_of_a_rounding_error_hides_nothing(y: float, yaw: float) -> None:
+    for dx, dy in (0.5, 0.3), (0.2, 0.5):
+        poses = np.array([[28.0, y, yaw], [28.0 + dx, y + dy, yaw + 6e-8]])
+        problem = car_problem(CAR, start=poses[0], goal=poses[1])
+        with pytest.raises(AuditError, match="sweeps a nonfree cell"):
+            audit(problem, poses[:, :2], headings=poses[:, 2])
 
 
 @pytest.mark.parametrize(("y", "clear"), [(30.15, True), (30.25, False)])

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from command_line import run as groundmap
 from oracles_planning import BLOCKED, FREE, grid_of
 from planners.bench.motions import COMPILED, LAMBDA, REACH, compare_motions, lambda_of
 from planners.costmap import Costmap
@@ -88,3 +91,32 @@ def test_the_lambda_is_right_about_states(footprint: Any, space: Any) -> None:
 def test_queries_that_have_no_route_are_not_measured() -> None:
     with pytest.raises(ProblemError, match=r"queries: expected one that may have a route, got"):
         compare_motions(walls(), footprint=0.0, queries=QUERIES[1:], seeds=1)
+
+
+YARD = [
+    "type octile", "height 16", "width 32", "map",
+    *["." * 15 + ("." if 5 <= row < 11 else "T") + "." * 16 for row in range(16)],
+]  # fmt: skip
+
+
+@needs_ompl
+def test_the_command_prints_rows_of_both_checks(tmp_path: Path) -> None:
+    (tmp_path / "yard.map").write_text("\n".join([*YARD, ""]))
+    scen = tmp_path / "yard.map.scen"
+    scen.write_text("version 1\n0\tyard.map\t32\t16\t2\t2\t29\t13\t32.0\n")
+    options = ["--queries", "1", "--seeds", "1"]
+    ran = groundmap("bench", "motions", scen, *options, "--json")
+    assert ran.code == 0
+    rows = json.loads(ran.out)["rows"]
+    assert [row["system"] for row in rows] == [LAMBDA, COMPILED, LAMBDA, COMPILED, REACH]
+    shown = groundmap("bench", "motions", scen, *options, "--footprint", "-1,-1 1,-1 1,1 -1,1")
+    assert "motions, se2: compiled" in shown.out
+
+
+def test_the_command_takes_no_voxels(tmp_path: Path) -> None:
+    (tmp_path / "cube.3dmap").write_text("voxel 4 4 4\n1 1 1\n")
+    scen = tmp_path / "cube.3dmap.3dscen"
+    scen.write_text("version 1\ncube.3dmap\n0 0 0 3 3 3 5.2 1.0\n")
+    ran = groundmap("bench", "motions", scen)
+    assert ran.code == 2
+    assert "expected queries on a 2-D map" in ran.err

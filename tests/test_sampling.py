@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 from itertools import product
+from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
@@ -379,3 +380,32 @@ def test_what_ompl_says_is_logged(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.DEBUG, logger="planners.sampling"):
         routed("rrtconnect", "r2")
     assert any("Starting planning" in record.getMessage() for record in caplog.records)
+
+
+MANY = """
+import gc
+from pathlib import Path
+
+def resident() -> float:
+    return int(Path("/proc/self/statm").read_text().split()[1]) * 4096 / 1e6
+
+names, marks = {names}, []
+for i in range(160):
+    name, space = names[i % len(names)], ("r2", "se2")[i % 2]
+    try:
+        plan(problem, name, space=space, seed=i, improve_for=0.02, keep_graph=name != "bitstar")
+    except ProblemError:
+        pass
+    if i in (49, 159):
+        gc.collect()
+        marks.append(resident())
+print(marks[1] - marks[0] < 5.0, marks)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="Linux tells how much is used")
+@needs_ompl
+def test_many_plans_take_no_more_memory_than_some() -> None:
+    ran = python(SMALL + MANY.format(names=R2))
+    assert ran.stdout.startswith("True"), ran.stdout
+    assert ran.stderr == ""

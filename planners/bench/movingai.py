@@ -94,7 +94,7 @@ def run(
     asked = [(work, query) for work in workloads for query in work.queries]
     for work, query in watch(asked):
         if arena is None or results[-1].workload is not work:
-            arena = Arena(_read_map(work), planner)
+            arena = Arena(read_map(work), planner)
             results.append(Result(work, arena.setup_ms, []))
         results[-1].answers.append(arena.ask(query))
     return results
@@ -120,7 +120,7 @@ def _workloads(scen: Path, root: Path, limit: int | None) -> list[Workload]:
     return found
 
 
-def _read_map(work: Workload) -> BlockedMap | BlockedVoxels:
+def read_map(work: Workload) -> BlockedMap | BlockedVoxels:
     """Read the map of a workload, and check that it is the one that the queries are about."""
     found: BlockedMap | BlockedVoxels
     if len(work.queries[0].start) == 3:

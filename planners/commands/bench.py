@@ -11,6 +11,7 @@ import typer
 from planners.bench.arena import ANY_ANGLE, figures
 from planners.bench.movingai import Result, find_workloads, run
 from planners.bench.worlds import WORKLOADS
+from planners.commands.bench_motions import motions_command
 from planners.commands.bench_samplers import Entry, race_samplers
 from planners.console import JsonOption, emit, emit_rows, say, watched
 
@@ -27,6 +28,9 @@ bench_app = typer.Typer(
 @bench_app.callback()
 def bench_group() -> None:
     """How fast planners are, and whether they find what others published."""
+
+
+bench_app.command("motions")(motions_command)
 
 
 @bench_app.command("planning")

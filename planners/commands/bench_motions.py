@@ -1,0 +1,66 @@
+"""``groundmap bench motions``: compiled checks of motions against a Python lambda per state."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from groundmap.io.map_images import BlockedMap, grid_of
+from groundmap.io.movingai_scen import MovingAIQuery
+from planners.bench.motions import compare_motions
+from planners.bench.movingai import find_workloads, read_map
+from planners.commands.options import outline
+from planners.console import JsonOption, emit, emit_rows, patiently
+from planners.engine import Pose
+from planners.errors import ProblemError
+
+
+def motions_command(
+    scen: Annotated[
+        Path, typer.Argument(metavar="SCEN", help="Queries of the MovingAI benchmark: a .scen.")
+    ],
+    footprint: Annotated[
+        str,
+        typer.Option(
+            metavar="R | 'X,Y X,Y X,Y ...'",
+            help="Radius [m, a cell's side is one] for r2, or corners [m, base_link] for se2.",
+        ),
+    ] = "0",
+    queries: Annotated[int, typer.Option(min=1, help="Evenly spread over the file.")] = 5,
+    seeds: Annotated[int, typer.Option(min=1, help="Searches for each query and check.")] = 3,
+    time_limit: Annotated[float, typer.Option(min=0.1, help="Of a search [s].")] = 10.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Check what RRT-Connect asks for, by a compiled call or a Python lambda for each cell."""
+    (work, *_) = find_workloads(scen, limit=queries)
+    found = read_map(work)
+    if not isinstance(found, BlockedMap):
+        raise ProblemError("SCEN", "queries on a 2-D map", str(scen))
+    asked = [_ends(query) for query in work.queries]
+    with patiently("searching by both checks"):
+        rows = compare_motions(
+            grid_of(found),
+            footprint=outline(footprint),
+            queries=asked,
+            seeds=seeds,
+            time_limit=time_limit,
+        )
+    if as_json:
+        emit({"map": work.name, "rows": rows}, as_json=True, title="")
+        return
+    shown = {f"{row['workload']}: {row['system']}": _figures(row) for row in rows}
+    emit_rows(shown, title=f"motions on {work.name}")
+
+
+def _figures(row: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in row.items() if name not in ("workload", "system")}
+
+
+def _ends(query: MovingAIQuery) -> tuple[Pose, Pose]:
+    """Return start and goal, at the centres of their cells, both looking from one to the other."""
+    start, goal = ((col + 0.5, row + 0.5) for row, col in (query.start, query.goal))
+    yaw = math.atan2(goal[1] - start[1], goal[0] - start[0])
+    return (*start, yaw), (*goal, yaw)
