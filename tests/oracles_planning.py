@@ -34,6 +34,15 @@ def free_field(rows: int, cols: int) -> Floats32:
     return np.full((rows, cols), FREE, dtype=np.float32)
 
 
+def rooms(door: int = 8) -> Bools:
+    """Return which cells of 0.25 m are blocked of four rooms of 6 m; doors are in cells."""
+    blocked = np.zeros((48, 48), dtype=np.bool_)
+    blocked[24] = blocked[:, 24] = True
+    for begin in (8, 32):
+        blocked[24, begin : begin + door] = blocked[begin : begin + door, 24] = False
+    return blocked
+
+
 def drawing(text: str) -> Floats32:
     """Return the evidence of a drawing: ``.`` free, ``#`` non-free, ``?`` unknown; top row first.
 

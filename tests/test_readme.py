@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -47,6 +48,12 @@ def test_every_planner_is_in_the_table() -> None:
         for rows in (table.partition("\n\n")[0] for table in tables)
     ]
     assert [sorted(names) for names in listed] == [sorted(OWN_PLANNERS), sorted(samplers())]
+
+
+def test_the_page_of_settings_is_what_the_code_says() -> None:
+    root = README.parent
+    made = runpy.run_path(str(root / "tools" / "make_settings.py"))["document"]()
+    assert (root / "docs" / "settings.md").read_text(encoding="utf-8") == made
 
 
 def test_the_first_example_has_ten_lines_at_most() -> None:

@@ -20,9 +20,8 @@ from scipy.sparse.csgraph import dijkstra
 
 from groundmap import ConfidenceGrid
 from groundmap.archive import read_archive, write_archive
-from groundmap.arrays import Bools
 from groundmap.errors import FileFormatError, SettingsError
-from oracles_planning import BLOCKED, FREE, UNSEEN, free_field, grid_of
+from oracles_planning import BLOCKED, FREE, UNSEEN, free_field, grid_of, rooms
 from planners import (
     CancelledError,
     CostSettings,
@@ -48,15 +47,6 @@ from strategies import rngs
 CAR = [(-0.5, -0.45), (1.0, -0.45), (1.0, 0.45), (-0.5, 0.45)]
 SPACES: list[Space] = ["r2", "se2", "reeds_shepp"]
 needs_ompl = pytest.mark.skipif(not samplers(), reason="ompl is not installed")
-
-
-def rooms() -> Bools:
-    """Return four rooms of 6 m, in cells of 0.25 m, with doors of 2 m."""
-    blocked = np.zeros((48, 48), dtype=np.bool_)
-    blocked[24] = blocked[:, 24] = True
-    for door in (8, 32):
-        blocked[24, door : door + 8] = blocked[door : door + 8, 24] = False
-    return blocked
 
 
 ROOMS = grid_of(np.where(rooms(), BLOCKED, FREE), resolution=0.25)

@@ -15,9 +15,8 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
-from groundmap.arrays import Bools
 from groundmap.errors import SettingsError
-from oracles_planning import BLOCKED, FREE, free_field, grid_of
+from oracles_planning import BLOCKED, FREE, free_field, grid_of, rooms
 from planners import (
     OWN_PLANNERS,
     PLANNERS,
@@ -49,15 +48,6 @@ BETTERING = ["bitstar", "informedrrtstar", "prmstar", "rrtstar", "sorrtstar"]
 CAR = [(-0.5, -0.45), (1.0, -0.45), (1.0, 0.45), (-0.5, 0.45)]
 QUICK = ["bkpiece1", "kpiece1", "rrtconnect"]
 needs_ompl = pytest.mark.skipif(not NAMES, reason="ompl is not installed")
-
-
-def rooms() -> Bools:
-    """Return four rooms of 6 m, in cells of 0.25 m, with doors of 2 m."""
-    blocked = np.zeros((48, 48), dtype=np.bool_)
-    blocked[24] = blocked[:, 24] = True
-    for door in (8, 32):
-        blocked[24, door : door + 8] = blocked[door : door + 8, 24] = False
-    return blocked
 
 
 ROOMS = grid_of(np.where(rooms(), BLOCKED, FREE), resolution=0.25)

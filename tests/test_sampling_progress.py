@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from groundmap.arrays import Bools
-from oracles_planning import BLOCKED, FREE, free_field, grid_of
+from oracles_planning import BLOCKED, FREE, free_field, grid_of, rooms
 from planners import (
     CancelledError,
     Improvement,
@@ -34,15 +33,6 @@ pytestmark = needs_ompl
 R2 = sorted(name for name in samplers() if refusal(name, "r2") is None)
 BETTERING = ["bitstar", "informedrrtstar", "prmstar", "rrtstar", "sorrtstar"]
 CAR = [(-0.5, -0.45), (1.0, -0.45), (1.0, 0.45), (-0.5, 0.45)]
-
-
-def rooms(door: int = 8) -> Bools:
-    """Return four rooms of 6 m, in cells of 0.25 m."""
-    blocked = np.zeros((48, 48), dtype=np.bool_)
-    blocked[24] = blocked[:, 24] = True
-    for begin in (8, 32):
-        blocked[24, begin : begin + door] = blocked[begin : begin + door, 24] = False
-    return blocked
 
 
 ROOMS = grid_of(np.where(rooms(), BLOCKED, FREE), resolution=0.25)

@@ -88,7 +88,12 @@ def plan_command(
     time_limit: Annotated[float, typer.Option(help="Give up after [s].")] = 30.0,
     settings: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help=f"A setting of the planner: {SETTINGS}."),
+        typer.Option(
+            "--set",
+            metavar="NAME=VALUE",
+            help=f"A setting of the planner: {SETTINGS}; OMPL's"
+            " planners: space, seed, iterations, goals and others, see docs/settings.md.",
+        ),
     ] = None,
     straighten: Annotated[bool, typer.Option("--shortcut", help="Pull the route tight.")] = False,
     turning_radius: Annotated[
