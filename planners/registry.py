@@ -28,6 +28,7 @@ from planners.polyanya import Polyanya, PolyanyaSettings
 from planners.problem import PlanningProblem
 from planners.route import Route
 from planners.sampling.door import samplers
+from planners.sampling.run import THREADED
 from planners.sampling.sampler import Sampler
 from planners.sampling.settings import SamplingSettings
 from planners.solve import solve
@@ -45,6 +46,7 @@ class Planner(NamedTuple):
     headings: bool = False  #: whether it heeds headings
     anytime: bool = False  #: whether it tells of routes while it searches, and can be cancelled
     spatial: bool = False  #: whether it can be made on `Voxels`
+    repeatable: bool = True  #: whether it repeats a route exactly, if no time limit ends it
 
 
 class Planners(MutableMapping[str, Planner]):
@@ -86,7 +88,12 @@ class Planners(MutableMapping[str, Planner]):
 def _sampling() -> dict[str, Planner]:
     return {
         name: Planner(
-            partial(Sampler, name), SamplingSettings, headings=True, anytime=True, spatial=True
+            partial(Sampler, name),
+            SamplingSettings,
+            headings=True,
+            anytime=True,
+            spatial=True,
+            repeatable=name not in THREADED,
         )
         for name in samplers()
     }

@@ -151,6 +151,11 @@ def test_a_seed_repeats_its_route_exactly_and_another_brings_another(
     assert other.expanded != first.expanded
 
 
+@needs_ompl
+def test_planners_that_run_threads_are_flagged_as_not_repeatable() -> None:
+    assert {name for name in PLANNERS if not PLANNERS[name].repeatable} == {"prm", "prmstar"}
+
+
 @pytest.mark.parametrize("space", ["dubins", "reeds_shepp"])
 @needs_ompl
 def test_curves_turn_no_tighter_than_told(space: Space) -> None:
