@@ -36,6 +36,10 @@ class SearchSettings(Settings):
         """Whether a route may end elsewhere than at the problem's goal."""
         return False
 
+    def will_do(self, end: Pose, goal: Pose, *, axes: int) -> bool:
+        """Whether a route to a goal may end in a pose, on a map of two axes or three."""
+        return end == goal
+
 
 class Found(NamedTuple):
     """What a planner brings back."""

@@ -95,7 +95,8 @@ def plan_many(
     chosen = named(planner)
     options = chosen.settings(**settings)
     headings = chosen.headings and options.heeds_headings(problem)
-    problems = _problems(problem, pairs, headings=headings)
+    turned = (("start",) if options.takes_other_goals else ("start", "goal")) if headings else ()
+    problems = _problems(problem, pairs, turned=turned)
     workers = min(_threads(threads), max(len(problems), 1))
     if not problems:
         return []
@@ -108,9 +109,9 @@ def plan_many(
 
 
 def _problems(
-    problem: PlanningProblem, pairs: Iterable[Pair], *, headings: bool
+    problem: PlanningProblem, pairs: Iterable[Pair], *, turned: tuple[str, ...]
 ) -> list[PlanningProblem]:
-    """Return a problem for each pair; what they clear is the same."""
+    """Return a problem for each pair, some of whose places need a yaw; they clear the same."""
     if problem.grid.ndim != 2:
         raise ProblemError(
             "grid", "a 2-D map", f"a {problem.grid.ndim}-D one", hint="Use `plan` for each pair."
@@ -125,8 +126,9 @@ def _problems(
             asked = replace(problem, start=start, goal=goal, cleared_at=problem.clear_place)
         except ProblemError as error:
             raise ProblemError(f"pairs[{i}], {error.name}", error.expected, error.got) from error
-        if headings and 2 in (len(asked.start), len(asked.goal)):
-            raise ProblemError(f"pairs[{i}]", "a start and a goal with yaws [rad]", repr(pair))
+        if any(len(getattr(asked, place)) == 2 for place in turned):
+            expected = f"a {' and a '.join(turned)} with yaws [rad]"
+            raise ProblemError(f"pairs[{i}]", expected, repr(pair))
         problems.append(asked)
     return problems
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import replace
 from typing import Any, TypeVar
@@ -12,7 +13,7 @@ from planners.costmap import Costmap
 from planners.enclosure import enclosed
 from planners.enclosure3d import enclosed_3d
 from planners.engine import Engine, Pose
-from planners.errors import ProblemError
+from planners.errors import AuditError, ProblemError
 from planners.problem import PlanningProblem
 from planners.route import Route
 from planners.voxels import Voxels
@@ -53,6 +54,7 @@ def solve(
     ProblemError
         A start or a goal without a yaw, for a planner that heeds headings.
     NonFreeError, UnknownSpaceError, EnclosedError, TimeLimitError, CancelledError, UnsolvedError
+    AuditError
     """
     problem = space.problem
     start, goal = tuple(map(float, problem.start)), tuple(map(float, problem.goal))
@@ -68,6 +70,10 @@ def solve(
             raise enclosed_3d(space)
         raise enclosed(space, needed=2.0 * problem.shape.inscribed_radius if headings else None)
     if found.goal is not None:
+        axes = problem.grid.ndim
+        if audited and not settings.will_do(found.goal, goal, axes=axes):
+            off = math.dist(found.goal[:axes], goal[:axes])
+            raise AuditError("ends at no goal", found.goal[:axes], got=off, needed=0.0)
         space = posed(space, replace(problem, goal=found.goal, cleared_at=problem.clear_place))
     seconds = time.perf_counter() - began
     return answer(space, found, planner=engine.name, seconds=seconds, audited=audited)

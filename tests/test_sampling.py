@@ -36,8 +36,9 @@ from planners.engine import Clock
 from planners.sampling.door import samplers
 from planners.sampling.objectives import HEEDING, Objective
 from planners.sampling.progress import Progress
-from planners.sampling.run import EXACT, REASONS, THREADED, Run, Task
+from planners.sampling.run import REASONS, THREADED, Run, Task
 from planners.sampling.settings import PARAMETERS, REFUSED, Space, refusal, setter_of
+from planners.sampling.sliced import EXACT
 from planners.sampling.ways import Ways
 
 NAMES = sorted(samplers())
@@ -378,6 +379,7 @@ def test_what_ompl_says_is_logged(caplog: pytest.LogCaptureFixture) -> None:
 
 
 MANY = """
+import ctypes
 import gc
 from pathlib import Path
 
@@ -393,6 +395,7 @@ for i in range(160):
         pass
     if i in (49, 159):
         gc.collect()
+        ctypes.CDLL(None).malloc_trim(0)
         marks.append(resident())
 print(marks[1] - marks[0] < 5.0, marks)
 """

@@ -7,6 +7,7 @@ import signal
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable
+from contextlib import suppress
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any, Generic, TypeVar
@@ -39,7 +40,8 @@ class _Hand(Generic[T, R]):
     def give(self, task: T, patience: float) -> None:
         """Hand over a task."""
         self.task, self.due = task, time.monotonic() + patience
-        self.pipe.send(task)
+        with suppress(OSError):  # it has ended, which its pipe tells whoever waits for it
+            self.pipe.send(task)
 
     @property
     def is_overdue(self) -> bool:
@@ -104,7 +106,7 @@ def _result(hand: _Hand[T, R], lost: Callable[[T, str], R], patience: float) -> 
         return lost(hand.task, f"its process did not end within {patience:g} s"), False
     try:
         result: R = hand.pipe.recv()
-    except EOFError:
+    except (EOFError, OSError):  # the latter if it ended before it read its task
         hand.process.join()
         return lost(hand.task, f"its process ended with {hand.process.exitcode}"), False
     return result, True

@@ -19,6 +19,7 @@ from planners.sampling.settings import Space, refusal
 SPACES: tuple[Space, ...] = get_args(Space)
 PATIENCE = 120.0  # [s] beyond the time limit, for what is made and compiled before
 MOMENTS = 80  # points of a curve, at most
+ROUNDING = 1e-9  # relative, of costs
 FINDS = 3  # what everybody may tell: a route as it was found, as it was checked, and simplified
 
 
@@ -109,7 +110,7 @@ def optima(works: Sequence[Workload], races: Sequence[Race]) -> dict[tuple[str, 
         ]
         known = shortest(by_name[name].cases()[space]) if space == "r2" else None
         best = min(costs, default=None)
-        if known is not None and (best is None or known <= best):
+        if known is not None and (best is None or known <= best * (1.0 + ROUNDING)):
             found[name, space] = Optimum(known, is_best_known=False)
         else:
             found[name, space] = Optimum(best, is_best_known=True)
@@ -128,7 +129,7 @@ def row(race: Race, optimum: Optimum) -> dict[str, Any]:
     cost = float(np.median([attempt.cost for attempt in won])) if won else None
     ratio = cost / optimum.cost if cost is not None and optimum.cost else None
     reasons = Counter(attempt.reason for attempt in race.attempts if not attempt.solved)
-    curve = [] if optimum.cost is None else progress(race, optimum.cost)
+    curve = progress(race, optimum.cost) if optimum.cost else []
     return {
         "workload": race.work,
         "space": race.space,

@@ -111,7 +111,16 @@ def planning_command(
             " (or take --samplers)",
             param_hint="--movingai",
         )
+    if samplers and limit is not None:
+        raise typer.BadParameter("expected it with --movingai, got it with --samplers",
+                                 param_hint="--limit")  # fmt: skip
     if movingai is not None:
+        others = {"--space": space, "--workload": workload, "--map": map_file,
+                  "--footprint": footprint, "--jobs": jobs, "--plot": plot}  # fmt: skip
+        for option, value in others.items():
+            if value is not None and value != []:
+                raise typer.BadParameter("expected it with --samplers, got it with --movingai",
+                                         param_hint=option)  # fmt: skip
         if len(planner or []) > 1:
             got = ", ".join(planner or [])
             raise typer.BadParameter(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -107,10 +108,14 @@ def _works(entry: Entry) -> list[Workload]:
     if isinstance(footprint, list):
         footprint = tuple(footprint)
     ours = [Workload(name) for name in _known("workload", entry.workloads, list(WORKLOADS))]
+    asked = {file: path for path in entry.maps for file in find_maps(path)}
+    counts = Counter(_title(file, path) for file, path in asked.items())
+    titles = {file: _title(file, path) for file, path in asked.items()}
     maps = [
-        Workload(_title(file, path), file, footprint, entry.turning_radius)
-        for path in entry.maps
-        for file in find_maps(path)
+        Workload(
+            title if counts[title] == 1 else file.as_posix(), file, footprint, entry.turning_radius
+        )
+        for file, title in titles.items()
     ]
     return maps if maps and not entry.workloads else ours + maps
 

@@ -15,15 +15,21 @@ from numba import njit
 from groundmap.arrays import Bytes, Floats
 from planners.kernels.curves import along, wrap
 from planners.kernels.footprint import Shape, cuts
-from planners.kernels.sampling import comes_later, curve_motions
+from planners.kernels.sampling import (
+    ARM,
+    BULGE,
+    INSCRIBED,
+    RADIUS,
+    SIZE,
+    SPIKE,
+    comes_later,
+    curve_motions,
+)
 from planners.kernels.shortcut import leg_cost
 
 # What `prices` holds: of a cell's side, of a cell's side per unit of its cost, of the time in which
 # a cell's side is driven at full speed, and of that in which a radian is turned.
 LENGTH, COST, DRIVE, TURN = range(4)
-# What `numbers` begins with, as that of `planners.kernels.sampling.Body`: a cell's side [m], the
-# turning radius, and of the footprint its radius, arm, spike, inscribed radius and bulge [cells].
-SIZE, TURNING_RADIUS, RADIUS, ARM, SPIKE, INSCRIBED, BULGE = range(7)
 
 
 @njit(cache=True, nogil=True)

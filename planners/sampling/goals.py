@@ -22,7 +22,12 @@ TRIES = 1024  # at either way to find those of one goal
 
 
 def goal_states(
-    ways: Ways | Ways3D, settings: SamplingSettings, goal: Pose, seed: int
+    ways: Ways | Ways3D,
+    settings: SamplingSettings,
+    goal: Pose,
+    seed: int,
+    *,
+    within: Bools | None = None,
 ) -> list[Pose]:
     """Return the clear states in which a route may end; none if there is none.
 
@@ -39,6 +44,8 @@ def goal_states(
         x, y (in 3-D: x, y, z) [m, map] and, where the space has it, yaw [rad]. Where any heading
         will do, it needs no yaw.
     seed : int
+    within : ndarray of bool, shape (rows, cols), optional
+        Cells that a route can end in; on voxels of shape (layers, rows, cols).
 
     Returns
     -------
@@ -74,7 +81,7 @@ def goal_states(
         for place in goals
         if not turns or len(place) > axes
         for state in [ways.state_of(place)]
-        if ways.is_clear(*state, *state)
+        if _will_do(ways, state, within)
     ]
     if settings.goal_radius == 0.0 and not (turns and settings.goal_yaw_tolerance > 0.0):
         return exact
@@ -82,7 +89,9 @@ def goal_states(
     samples = [
         sample
         for number, place in enumerate(goals)
-        for sample in _samples(ways, settings, place, np.random.default_rng([seed, number]), count)
+        for sample in _samples(
+            ways, settings, place, np.random.default_rng([seed, number]), count, within=within
+        )
     ]
     return [*exact, *(state for _, state in sorted(samples))]
 
@@ -107,19 +116,22 @@ def _samples(
     goal: Pose,
     rng: np.random.Generator,
     count: int,
+    *,
+    within: Bools | None,
 ) -> list[tuple[float, Pose]]:
     """Return clear states near enough to one goal, each after its distance to it."""
     found: list[tuple[float, Pose]] = []
     axes = _axes(ways)
     centre, yaw = goal[:axes], goal[axes:]
-    for place in chain(_disc(settings, centre, rng), _centres(ways, settings, centre, rng)):
+    centres = _centres(ways, settings, centre, rng, within)
+    for place in chain(_disc(settings, centre, rng), centres):
         turn = 0.0
         pose = place
         if ways.space not in FLAT:
             turn = float(rng.uniform(-1.0, 1.0)) * (settings.goal_yaw_tolerance if yaw else math.pi)
             pose = (*place, (yaw[0] if yaw else 0.0) + turn)
         state = ways.state_of(pose)
-        if ways.is_clear(*state, *state):
+        if _will_do(ways, state, within):
             away = math.dist(place, centre) + settings.yaw_weight * (abs(turn) if yaw else 0.0)
             found.append((away, state))
             if len(found) == count:
@@ -137,19 +149,37 @@ def _disc(settings: SamplingSettings, centre: Pose, rng: np.random.Generator) ->
 
 
 def _centres(
-    ways: Ways | Ways3D, settings: SamplingSettings, centre: Pose, rng: np.random.Generator
+    ways: Ways | Ways3D,
+    settings: SamplingSettings,
+    centre: Pose,
+    rng: np.random.Generator,
+    within: Bools | None,
 ) -> Iterator[Pose]:
     """Yield centres of cells near enough to a goal where the footprint may fit [map], shuffled."""
     window, radius = ways.costmap.window, settings.goal_radius
     if radius == 0.0:
         return
-    places = _places(ways)
+    places = _places(ways) if within is None else _places(ways) & within
     box = [ways.costmap.to_cells(np.array(centre) + side)[0, ::-1] for side in (-radius, radius)]
     low, high = np.clip(np.floor(box), 0, np.array(places.shape) - 1).astype(np.int64)
     part = tuple(map(slice, low.tolist(), (high + 1).tolist()))
     centres: Floats = window.cell_to_world(np.argwhere(places[part]) + low)
     near = centres[np.linalg.norm(centres - centre, axis=1) <= radius]
     yield from map(tuple, rng.permutation(near)[:TRIES].tolist())
+
+
+def come_near(ways: Ways | Ways3D, settings: SamplingSettings, goal: Pose, cells: Bools) -> bool:
+    """Whether any place in some cells may be near enough to a goal: if not, that is a proof."""
+    axes, window = _axes(ways), ways.costmap.window
+    centres: Floats = window.cell_to_world(np.argwhere(cells))
+    most = settings.goal_radius + math.sqrt(axes) * window.resolution
+    goals = _checked(ways, settings, goal)
+    return any((np.linalg.norm(centres - one[:axes], axis=1) <= most).any() for one in goals)
+
+
+def _will_do(ways: Ways | Ways3D, state: Pose, within: Bools | None) -> bool:
+    clear = ways.is_clear(*state, *state)
+    return clear and (within is None or bool(within[ways.cell_of(state)]))
 
 
 def _places(ways: Ways | Ways3D) -> Bools:

@@ -167,8 +167,8 @@ class Net:
     def _holds(self, vertices: Ints, is_clear: Checked) -> bool:
         """Whether all edges along a path are clear; those that aren't are never taken again.
 
-        They were when the roadmap was grown. But a file's may lie on a map with another origin,
-        and rounding may choose another one of two equally short curves then.
+        They were when the roadmap was grown. But over a file's the map may have grown: states
+        count from another corner then, and rounding may choose another of two equal curves.
         """
         holds = True
         for a, b in pairwise(vertices.tolist()):

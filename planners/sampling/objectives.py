@@ -17,14 +17,13 @@ from planners.costs import MAX_NON_OBSTACLE
 from planners.engine import Pose
 from planners.errors import ProblemError
 from planners.hybrid_parts import shape_of
+from planners.kernels.sampling import ARM, BULGE
+from planners.kernels.sampling import TURNING as TURNING_RADIUS
 from planners.kernels.sampling_costs import (
-    ARM,
-    BULGE,
     COST,
     DRIVE,
     LENGTH,
     TURN,
-    TURNING_RADIUS,
     curve_cost,
     curve_length,
     line_cost,

@@ -29,11 +29,14 @@ class Progress:
         When the first route came; infinite before.
     enough : bool
         Whether who was told wants no better one.
+    fault : int or None
+        The `id` of what who was told has raised; kept itself, it would keep OMPL's objects.
     """
 
     def __init__(self, clock: Clock, tell: OnImproved | None) -> None:
         self.clock, self.tell = clock, tell
         self.cost, self.since, self.enough = math.inf, math.inf, False
+        self.fault: int | None = None
 
     def found(self, cost: float, waypoints: Floats = UNTOLD) -> None:
         """Take note of a route, and tell of it if it is better than those before."""
@@ -50,7 +53,11 @@ class Progress:
 
     def _say(self, cost: float, waypoints: Floats) -> None:
         self.cost, self.since = cost, min(self.since, self.clock.seconds)
-        if self.tell is not None and self.tell(
-            Improvement(cost, math.inf, self.clock.seconds, waypoints)
-        ):
-            self.enough = True
+        if self.tell is None:
+            return
+        try:
+            enough = self.tell(Improvement(cost, math.inf, self.clock.seconds, waypoints))
+        except BaseException as error:
+            self.fault = id(error)
+            raise
+        self.enough = self.enough or bool(enough)

@@ -134,6 +134,7 @@ class Roadmap:
             raise ProblemError("planner", "OMPL", "none", hint="pip install ompl.")
         start = tuple(map(float, problem.start))
         check_space(ways.costmap, "start", start, headings=ways.space not in FLAT)
+        Objective(ways, told)  # refuses what it can't weigh, before time is spent
         graph = grown(planner, ways, ways.state_of(start), told, seconds=seconds, cancel=cancel)
         return cls(ways, graph, told)
 

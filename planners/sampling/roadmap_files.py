@@ -17,9 +17,10 @@ from planners.costmap import Costmap
 from planners.errors import OutsideMapError
 from planners.problem import PlanningProblem
 from planners.sampling.graph import Graph
-from planners.sampling.settings import SamplingSettings
+from planners.sampling.settings import SamplingSettings, Space
 
 FORMAT, VERSION = "groundmap roadmap", 1
+SPACES: tuple[Space, ...] = ("r2", "se2", "reeds_shepp")  # whose ways lead back, too
 
 
 def write_roadmap(
@@ -73,6 +74,8 @@ def read_roadmap(
         asked = replace(problem, start=place, goal=place, cleared_at=cleared)
     except (KeyError, TypeError, ValueError) as error:
         raise FileFormatError(path, "a whole roadmap", "one that lacks something") from error
+    if settings.space not in SPACES:
+        raise FileFormatError(path, f"a roadmap in one of {', '.join(SPACES)}", repr(space))
     if not _fits(graph, width=2 if space == "r2" else 3):
         raise FileFormatError(path, "a whole roadmap", "arrays that don't fit each other")
     costmap = _costmap_of(asked)
@@ -105,6 +108,7 @@ def _fits(graph: Graph, *, width: int) -> bool:
         and vertices.dtype == weights.dtype == np.float64
         and edges.dtype == np.int64
         and bool(np.isfinite(vertices).all())
+        and bool((weights >= 0.0).all())
         and bool(((edges >= 0) & (edges < len(vertices))).all())
     )
 

@@ -21,7 +21,7 @@ from planners.sampling.objectives import Objective
 from planners.sampling.progress import Progress
 from planners.sampling.settings import FLAT, SamplingSettings, setter_of
 from planners.sampling.simplified import simplified
-from planners.sampling.sliced import guarded, in_slices
+from planners.sampling.sliced import EXACT, guarded, in_slices
 from planners.sampling.states import (
     drawing,
     edge_check,
@@ -34,7 +34,6 @@ from planners.sampling.states import (
 from planners.sampling.ways import Bounds, Ways
 from planners.sampling.ways3d import Ways3D
 
-EXACT = "EXACT_SOLUTION"
 # Every other status of OMPL, and what it means to who asked. Starts and goals are checked before.
 REASONS = {
     "APPROXIMATE_SOLUTION": "the goal itself was not reached",
@@ -56,6 +55,9 @@ GLANCE = 16  # questions whether to stop between two looks at the clock
 # and with one, which is lost then.
 LATE, LATE_WITH_ROUTE = 0.1, 0.5
 ROUNDING = 1e-9  # relative, of costs
+# [m] RRT-Connect cuts an edge to its goal short by driving on from the goal: forward only, that
+# leads to nowhere.
+UNCUT = 1e6
 SAMPLES = 1000  # that planners begin with which take all of their samples at first
 
 
@@ -112,6 +114,8 @@ class Run:
             except _LateError:
                 return Outcome("TIMEOUT", [], None, self._checked())
             except RuntimeError as error:  # what C++ throws arrives as that
+                if id(error) == self.progress.fault:
+                    raise
                 return Outcome(f"OMPL says: {error}", [], None, self._checked())
 
     def _outcome(self) -> Outcome:
@@ -177,6 +181,8 @@ class Run:
         """Return the planner's own parameters: what was told, and how far edges reach."""
         told = self.settings.parameters()
         if hasattr(planner, "setRange") and "range" not in told:
+            if (self.task.name, self.ways.space) == ("rrtconnect", "dubins"):
+                return told | {"range": UNCUT}
             return told | {"range": self.ways.reach(self.task.region, self.task.room)}
         return told
 
@@ -202,8 +208,13 @@ class Run:
 
     @property
     def _is_over(self) -> bool:
+        """Whether the search has had all it gets, and its route all the time to be bettered."""
         iterations = self.settings.iterations
-        return self.clock.is_up or (iterations is not None and self.looks >= iterations)
+        if self.clock.is_up or self.progress.enough:
+            return True
+        if iterations is not None:
+            return self.looks >= iterations
+        return self.progress.has_had(self.settings.improve_for)
 
     def _look(self) -> None:
         """Stop a search from within that doesn't ask whether to.
@@ -231,11 +242,9 @@ class Run:
             if betters:  # SORRT* looks for ever for what is better than the best there can be
                 over = over or planner.bestCost().value() <= self.optimum
             if not over and (counted or self.looks % GLANCE == 0 or self.late < math.inf):
-                over = self._is_over
                 if betters and math.isfinite(cost := planner.bestCost().value()):
                     progress.found(scale * cost)
-                    bettered = not counted and progress.has_had(self.settings.improve_for)
-                    over = over or progress.enough or bettered
+                over = self._is_over
             return over
 
         return stop

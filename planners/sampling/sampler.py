@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 
 from groundmap.errors import SettingsError
@@ -18,11 +19,12 @@ from planners.errors import (
 )
 from planners.sampling.door import has_parameter
 from planners.sampling.found import found_of
-from planners.sampling.goals import goal_states
+from planners.sampling.goals import come_near, goal_states
 from planners.sampling.objectives import Objective
 from planners.sampling.progress import Progress
-from planners.sampling.run import EXACT, REASONS, THREADED, Outcome, Run, Task
+from planners.sampling.run import REASONS, THREADED, Outcome, Run, Task
 from planners.sampling.settings import FLAT, SamplingSettings, Space, refusal
+from planners.sampling.sliced import EXACT
 from planners.sampling.turns import Ending, turn
 from planners.sampling.warm import better_region, first_states
 from planners.sampling.ways import Ways, box_of
@@ -151,11 +153,14 @@ class Sampler:
         begin = self._state(ways, "start", start)
         if not settings.takes_other_goals:
             self._state(ways, "goal", goal)
-        goals = goal_states(ways, settings, goal, settings.seed)
-        if settings.takes_other_goals and not goals:
-            check_space(self.costmap, "goal", goal, headings=ways.space not in FLAT)
         region = ways.region(begin)
-        goals = [state for state in goals if region[ways.cell_of(state)]]
+        goals = goal_states(ways, settings, goal, settings.seed, within=region)
+        if not goals and settings.takes_other_goals:
+            if not goal_states(ways, settings, goal, settings.seed):
+                check_space(self.costmap, "goal", goal, headings=ways.space not in FLAT)
+            if come_near(ways, settings, goal, region):
+                reason = "nowhere near enough to a goal was found that can be reached"
+                raise UnsolvedError(self.name, reason=reason, expanded=0)
         if not (goals and ways.is_clear(*begin, *begin)):
             return None
         return Task(
@@ -192,7 +197,12 @@ class Sampler:
         longest = task.objective.longest(cost)
         region = better_region(task.region, size, task.start, task.goals, longest)
         room = box_of(region, size)
-        found = _alone_run(replace(task, region=region, room=room, first=first))
+        with ExitStack() as mine:
+            try:
+                mine.enter_context(turn(task.clock))
+            except (CancelledError, TimeLimitError):
+                return self._told(task, first, 0)
+            found = Run(replace(task, region=region, room=room, first=first)).outcome()
         better = found.status == EXACT and task.objective.cost(found.states) < cost
         states = found.states if better else first
         return self._told(task, states, found.checked)._replace(graph=found.graph)

@@ -14,12 +14,14 @@ from planners.problem import PlanningProblem
 Space = Literal["r2", "se2", "dubins", "reeds_shepp", "r3"]
 TURNING: tuple[Space, ...] = ("dubins", "reeds_shepp")  # spaces of bounded curvature
 FLAT: tuple[Space, ...] = ("r2", "r3")  # spaces without a yaw
+ROUNDING = 1e-9  # [m; rad] by which a route may miss what will do as a goal
 
 
 class SamplingSettings(SearchSettings):
     """What a sampling planner can be told.
 
-    Those up to `keep_graph` are for all of them. The others are parameters of single planners,
+    Those up to `keep_graph` are for all of them, but for a few that say why they refuse one (PRM
+    counts no iterations, BFMT takes one goal). The others are parameters of single planners,
     by the names that OMPL's setters have (``range`` is ``setRange``); where none is given, OMPL's
     own value counts, and a planner that has no such parameter refuses it.
     """
@@ -145,6 +147,18 @@ class SamplingSettings(SearchSettings):
         """Whether a route may end elsewhere than at the problem's goal."""
         return bool(self.goals) or self.goal_radius > 0 or self.goal_yaw_tolerance > 0
 
+    def will_do(self, end: Pose, goal: Pose, *, axes: int) -> bool:
+        """Whether a route to a goal may end in a pose: near enough to one, turned as it will do."""
+        near, turned = self.goal_radius + ROUNDING, self.goal_yaw_tolerance + ROUNDING
+        return any(
+            math.dist(end[:axes], other[:axes]) <= near
+            and all(
+                abs(math.remainder(yaw - asked, math.tau)) <= turned
+                for yaw, asked in zip(end[axes:], other[axes:], strict=False)
+            )
+            for other in (goal, *self.goals)
+        )
+
     def space_for(self, footprint: Footprint, start: Pose, goal: Pose, *, axes: int = 2) -> Space:
         """Return the space to plan in on a map of two axes or three."""
         if axes == 3:
@@ -160,8 +174,8 @@ class SamplingSettings(SearchSettings):
         return {name: getattr(self, name) for name in own}
 
 
-COMMON = 16  # settings before those of single planners, beside the time limit
-PARAMETERS: tuple[str, ...] = tuple(SamplingSettings.model_fields)[1 + COMMON :]
+_NAMES = tuple(SamplingSettings.model_fields)
+PARAMETERS: tuple[str, ...] = _NAMES[_NAMES.index("keep_graph") + 1 :]
 
 
 def setter_of(name: str) -> str:

@@ -48,23 +48,25 @@ def simplified(
     for turn in range(ROUNDS):
         places = _with_places(ways, best, (turn + 1) * SHIFT % 1.0)
         trial = _cheapest(places, ways, objective, clock)
+        if trial is None:
+            break
         before, after = cost, objective.cost(trial)
         if after < before:
             best, cost = trial, after
-        if after > (1.0 - GAIN) * before or clock.is_up:
+        if after > (1.0 - GAIN) * before:
             break
     return best
 
 
 def _cheapest(
     places: list[Pose], ways: Ways | Ways3D, objective: Objective, clock: Clock
-) -> list[Pose]:
-    """Return the cheapest path from the first place to the last, onwards; in a hurry, all."""
+) -> list[Pose] | None:
+    """Return the cheapest path from the first place to the last, onwards; None if time is up."""
     edge, is_clear = objective.edge, ways.is_clear
     costs, came = [0.0], [0]
     for j in range(1, len(places)):
         if clock.is_up:
-            return places
+            return None
         at, begin = places[j], max(0, j - WINDOW)
         befores = [(costs[i] + edge(*places[i], *at), i) for i in range(begin, j)]
         befores.sort()

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 if TYPE_CHECKING:
     from planners.sampling.run import Task
 
+EXACT = "EXACT_SOLUTION"
 SLICE = 0.05  # [s] they are stopped that often, to look whether to
 Answer = TypeVar("Answer")
 
@@ -37,11 +38,11 @@ def in_slices(planner: Any, definition: Any, task: Task, errors: list[BaseExcept
         status = ""
         while not (stopped.is_set() or errors):
             status = str(planner.solve(SLICE).getStatus().name)
-            if status == "EXACT_SOLUTION":
+            if status == EXACT:
                 costs.append(task.objective.scale * float(definition.getSolutionPath().length()))
             if (costs and task.name == "prm") or task.clock.is_up:
                 break
-        return status
+        return EXACT if costs else status  # the last slice may have been too short to look
 
     def work() -> None:
         with busy:

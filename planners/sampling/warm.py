@@ -14,7 +14,7 @@ from planners.engine import Clock, Found, Pose, SearchSettings
 from planners.errors import TimeLimitError
 from planners.hybrid import HybridAStar, HybridAStarSettings
 from planners.kernels.curves import wrap
-from planners.sampling.settings import TURNING, SamplingSettings
+from planners.sampling.settings import FLAT, TURNING, SamplingSettings
 from planners.sampling.ways import Ways
 from planners.sampling.ways3d import Ways3D
 from planners.voxels import Voxels
@@ -37,6 +37,8 @@ def first_states(
     clock : Clock
         Of the whole search.
     """
+    if ways.space not in FLAT and len(goal) == 2:  # any heading will do
+        goal = (*goal, start[2])
     left = None if clock.time_limit is None else max(clock.time_limit - clock.seconds, 0.0)
     try:
         found = _searched(ways, start, goal, settings, left)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from scipy import ndimage
@@ -40,6 +40,8 @@ CHECKS: dict[str, Callable[..., bool]] = {
     "dubins": dubins_clear_at,
     "reeds_shepp": reeds_shepp_clear_at,
 }
+# Of the arrays of a `Body`, as `planners.kernels.sampling_at` reads them.
+KINDS = (np.bool_, np.int64, np.float64, np.float64, np.int64, np.float64, np.float64)
 REACH = 8.0  # how many times the mean clearance an edge is long, at most
 SHARE = 0.2  # of the extent of what is sampled: OMPL's own choice
 
@@ -81,7 +83,7 @@ class Ways:
     is_clear: Callable[..., bool]
 
     def __init__(self, costmap: Costmap, space: Space, turning_radius: float) -> None:
-        self.costmap, self.space = costmap, space
+        self.costmap, self.space, self.turning_radius = costmap, space, turning_radius
         size = costmap.window.resolution
         ground, self.shape = ground_of(costmap), shape_of(costmap.problem.shape, size)
         self.body = Body(
@@ -90,6 +92,10 @@ class Ways:
             np.array([size, turning_radius / size, *self.shape[3:]]),
         )
         self.is_clear = _bound(CHECKS[space], self.body)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how to make a copy or a pickle anew: an address is good for these arrays only."""
+        return Ways, (self.costmap, self.space, self.turning_radius)
 
     def state_of(self, pose: Pose) -> Pose:
         """Return a pose [map] as a state."""
@@ -186,8 +192,9 @@ def box_of(region: Bools, size: float) -> Bounds:
 
 def _bound(check: Callable[..., bool], body: Body) -> Callable[..., bool]:
     """Return a check that is told once where the arrays are which it reads."""
-    arrays = [np.ascontiguousarray(array) for array in body]
-    table = np.array([(array.ctypes.data, *array.shape, 1)[:WORDS] for array in arrays])
+    arrays = [np.ascontiguousarray(*pair) for pair in zip(body, KINDS, strict=True)]
+    words = [(array.ctypes.data, *array.shape, 1)[:WORDS] for array in arrays]
+    table = np.array(words, dtype=np.int64)
     bound = partial(check, table.ctypes.data)
     vars(bound)["kept"] = table, arrays  # an address alone keeps nothing
     return bound

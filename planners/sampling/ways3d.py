@@ -14,7 +14,6 @@ from groundmap.arrays import Bools, Floats, Ints32
 from planners.engine import Pose
 from planners.kernels.distance import NOWHERE
 from planners.kernels.sampling3d import SLACK, all_squared_distances, line_clear
-from planners.polyline import length_of
 from planners.sampling.settings import Space
 from planners.sampling.ways import REACH, SHARE, Bounds, box_of
 from planners.voxels import Voxels
@@ -108,18 +107,10 @@ class Ways3D:
         halves = float(np.sqrt(self.squared[region]).mean())
         return min(REACH * 0.5 * halves * self.voxels.window.resolution, SHARE * extent)
 
-    def apart(self, a: Pose, b: Pose) -> float:
-        """Return how far two states are apart [m]."""
-        return math.dist(a, b)
-
     def poses(self, states: Sequence[Pose]) -> Floats:
         """Return the places along a path, shape (n, 3) [m, map]."""
         poses: Floats = np.array(states) + self.voxels.window.origin
         return poses
-
-    def length(self, states: Sequence[Pose]) -> float:
-        """Return the length of a path [m]."""
-        return length_of(np.array(states))
 
     def _part_of(self, state: Pose) -> int:
         return int(self._parts[self.cell_of(state)])
