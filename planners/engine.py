@@ -73,6 +73,17 @@ class Cancel(Protocol):
         ...
 
 
+def check_cancel(cancel: Any) -> None:
+    """Check that a search can be stopped with what is given for that, if anything is.
+
+    Raises
+    ------
+    ProblemError
+    """
+    if cancel is not None and not callable(getattr(cancel, "is_set", None)):
+        raise ProblemError("cancel", "a threading.Event", repr(cancel))
+
+
 class Engine(Protocol):
     """A planner on one costmap: made once, asked as often as one likes, by a thread at a time."""
 

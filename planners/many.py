@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -31,6 +32,7 @@ class _Desk(NamedTuple):
     settings: SearchSettings
     headings: bool
     audited: bool
+    watch: dict[str, Any]
 
 
 def plan_many(
@@ -103,9 +105,17 @@ def plan_many(
     costmap = Costmap.of(problems[0])
     for name in ("moves", "steps", "clearance"):  # worked out by one thread, not by each
         getattr(costmap, name)
-    desk = _Desk(costmap, _engines(chosen, costmap, workers), options, chosen.headings, audit)
+    stop = threading.Event()
+    watch = {"cancel": stop} if chosen.anytime else {}
+    engines = _engines(chosen, costmap, workers)
+    desk = _Desk(costmap, engines, options, chosen.headings, audit, watch)
     with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(lambda asked: _answer(desk, asked), problems))
+        try:
+            return list(pool.map(lambda asked: _answer(desk, asked), problems))
+        except BaseException:  # such as Ctrl-C, which would wait for all that run or wait
+            stop.set()
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
 
 
 def _problems(
@@ -164,7 +174,7 @@ def _answer(desk: _Desk, problem: PlanningProblem) -> Route | NoRouteError:
 
 def _route(desk: _Desk, engine: Engine, problem: PlanningProblem) -> Route:
     began = time.perf_counter()
-    check_on_map(problem)
+    check_on_map(problem, goal=not desk.settings.takes_other_goals)
     return solve(
         posed(desk.costmap, problem),
         engine,
@@ -172,4 +182,5 @@ def _route(desk: _Desk, engine: Engine, problem: PlanningProblem) -> Route:
         began=began,
         headings=desk.headings and desk.settings.heeds_headings(problem),
         audited=desk.audited,
+        watch=desk.watch,
     )

@@ -20,7 +20,7 @@ from planners.astar import (
 from planners.astar3d import AStar3D
 from planners.auto import Auto, AutoSettings
 from planners.dstar_lite import DStarLite, DStarLiteSettings
-from planners.engine import Cancel, Engine, OnImproved, SearchSettings
+from planners.engine import Cancel, Engine, OnImproved, SearchSettings, check_cancel
 from planners.errors import ProblemError
 from planners.hybrid import HybridAStar, HybridAStarSettings
 from planners.jps import JPS, JPSPlus, JPSPlusSettings, JPSSettings
@@ -133,7 +133,7 @@ def plan(
         A name in `PLANNERS`.
     on_improved : callable, optional
         Called with an `Improvement` for the first route and every better one, while the search
-        goes on. If it returns True, the search ends with that route. Only "ara" and sampling
+        goes on. If it returns True, it hears no more, and the search ends. Only "ara" and sampling
         planners tell.
     cancel : Cancel, optional
         Such as a `threading.Event`: once another thread sets it, the search ends, with the best
@@ -174,7 +174,7 @@ def plan(
     entry = named(planner)
     chosen = entry.settings(**settings)
     watch = _watch(planner, entry, on_improved=on_improved, cancel=cancel)
-    check_on_map(problem)
+    check_on_map(problem, goal=not chosen.takes_other_goals)
     space = space_of(problem)
     if isinstance(space, Voxels) and not entry.spatial:
         return solve(space, _engine_3d(space, planner), chosen, began=began)
@@ -190,8 +190,7 @@ def _watch(planner: str, entry: Planner, **watch: Any) -> dict[str, Any]:
         raise ProblemError(next(iter(asked)), expected, repr(planner))
     if "on_improved" in asked and not callable(asked["on_improved"]):
         raise ProblemError("on_improved", "a callable", repr(asked["on_improved"]))
-    if "cancel" in asked and not callable(getattr(asked["cancel"], "is_set", None)):
-        raise ProblemError("cancel", "a threading.Event", repr(asked["cancel"]))
+    check_cancel(asked.get("cancel"))
     return asked
 
 

@@ -41,7 +41,7 @@ class Route:
     length : float [m]
     cost : float [m]
         What the planner minimised: the length, where the problem says so with dear metres counted
-        more; of sampling planners, what their weights say.
+        more, cell by cell; of sampling planners, what their weights say, along the line.
     bound : float or None
         The cost is at most this many times the least that the planner could have found; None if
         it knows no bound.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import copy
 import gc
 import math
@@ -16,7 +17,15 @@ import pytest
 from command_line import run as groundmap
 from groundmap.errors import SettingsError
 from oracles_planning import BLOCKED, FREE, free_field, grid_of
-from planners import AuditError, PlanningProblem, Route, plan, plan_many
+from planners import (
+    AuditError,
+    OutsideMapError,
+    PlanningProblem,
+    ProblemError,
+    Route,
+    plan,
+    plan_many,
+)
 from planners.bench.crew import _Hand, _result
 from planners.bench.samplers import Optimum, Race, row
 from planners.bench.trials import Attempt
@@ -180,3 +189,51 @@ def test_options_of_the_other_bench_are_refused() -> None:
     assert (ran.code, "--space: expected it with --samplers" in ran.err) == (2, True)
     ran = groundmap("bench", "planning", "--samplers", "--limit", "3")
     assert (ran.code, "--limit: expected it with --movingai" in ran.err) == (2, True)
+
+
+def test_who_is_at_a_goal_stays_there() -> None:
+    for told in ({"goal_radius": 30.0}, {"goals": [[2, 2, 0]]}):
+        assert plan(asked(), "rrtconnect", **told).length == 0.0
+
+
+def test_a_goal_beyond_the_map_is_none_if_others_will_do() -> None:
+    route = plan(asked(goal=(500, 2)), "rrtconnect", goals=[[14, 2]])
+    assert route.waypoints[-1].tolist() == [14.0, 2.0]
+    with pytest.raises(OutsideMapError, match=r"^goal \(500.00, 2.00\): outside the map"):
+        plan(asked(goal=(500, 2)), "rrtconnect", goals=[[600, 2]])
+
+
+def test_goals_are_places() -> None:
+    for wrong in ((3, 4), "3,4", 7):
+        with pytest.raises(SettingsError, match=r"goals: expected a list of places, such as"):
+            plan(asked(), "rrtconnect", goals=wrong)
+
+
+def test_a_warm_start_is_pulled_tight() -> None:
+    route = plan(asked(), "rrtconnect", warm_start=True, iterations=1)
+    assert route.length < plan(asked(), "astar").length - 0.1
+
+
+def test_a_roadmap_says_that_its_map_has_changed() -> None:
+    problem = asked()
+    roadmap = Roadmap.grow(problem, iterations=300, seconds=30)
+    z = np.full((64, 64), FREE, dtype=np.float32)
+    z[40:, 32] = BLOCKED  # the rest of the wall
+    for _ in range(9):
+        problem.grid.fuse(np.array([0, 0]), z)
+    with pytest.raises(ProblemError, match=r"grid: expected the map that the roadmap was grown on"):
+        roadmap.plan((2, 2), (14, 2))
+
+
+def test_the_threads_of_many_plans_wait_without_loss() -> None:
+    pairs = [((2, 2), (14, y)) for y in (2, 4, 6, 8)]
+    found = plan_many(asked(), pairs, "rrtstar", threads=4, improve_for=0.5, time_limit=0.9)
+    assert all(isinstance(route, Route) for route in found)
+
+
+def test_ctrl_c_ends_many_plans() -> None:
+    timer = threading.Timer(0.5, _thread.interrupt_main)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt, match=r"^$"):
+        plan_many(needle(), [((2, 2), (9.5, 10))] * 4, "rrtconnect", time_limit=60)
+    timer.join()

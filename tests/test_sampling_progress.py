@@ -17,7 +17,6 @@ from planners import (
     PlanningProblem,
     ProblemError,
     Route,
-    TimeLimitError,
     plan,
 )
 from planners.costmap import Costmap
@@ -134,9 +133,8 @@ def test_a_search_that_waits_for_another_is_cancelled_too() -> None:
     impatient.set()
     with pytest.raises(CancelledError, match="cancelled after"):
         plan(problem(), "rrt", cancel=impatient)
-    with pytest.raises(TimeLimitError, match=r"no route within time_limit = 0.2 s"):
-        plan(problem(), "rrt", time_limit=0.2)
-    cancel.set()
+    threading.Timer(1.0, cancel.set).start()
+    assert plan(problem(), "rrt", time_limit=0.9).audit == "clean"  # waiting doesn't count
     other.join()
 
 

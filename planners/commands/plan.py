@@ -139,6 +139,7 @@ def plan_command(
         chosen = {"time_limit": time_limit, **assignments(settings or [])}
         named(planner).settings(**chosen)  # a name that `plan` takes itself is no setting
         route = plan(problem, planner, **chosen)
+        graph = route.graph
         if turning_radius is not None:
             route = smooth(problem, route, turning_radius=turning_radius)
         elif straighten:
@@ -152,7 +153,7 @@ def plan_command(
             waypoints=route.waypoints,
             footprint=problem.shape.to_value(),
             headings=route.headings,
-            graph=route.graph,
+            graph=graph,
         )
     emit(route.to_dict(), as_json=as_json, title=f"route of {planner} on {map_file}")
 

@@ -53,11 +53,11 @@ class Progress:
 
     def _say(self, cost: float, waypoints: Floats) -> None:
         self.cost, self.since = cost, min(self.since, self.clock.seconds)
-        if self.tell is None:
+        if self.tell is None or self.enough:
             return
         try:
             enough = self.tell(Improvement(cost, math.inf, self.clock.seconds, waypoints))
         except BaseException as error:
             self.fault = id(error)
             raise
-        self.enough = self.enough or bool(enough)
+        self.enough = bool(enough)

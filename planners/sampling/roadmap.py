@@ -8,12 +8,14 @@ from dataclasses import replace
 from os import PathLike
 from typing import Any
 
+import numpy as np
+
 from groundmap.arrays import Floats, is_number
 from groundmap.errors import SettingsError
 from planners.answers import check_on_map, check_space
 from planners.costmap import Costmap
-from planners.engine import Cancel, Found, Pose
-from planners.errors import ProblemError, UnsolvedError
+from planners.engine import Cancel, Found, Pose, check_cancel
+from planners.errors import AuditError, ProblemError, UnsolvedError
 from planners.problem import PlanningProblem
 from planners.route import Route
 from planners.sampling.door import samplers
@@ -127,6 +129,7 @@ class Roadmap:
         CancelledError
             `cancel` was set before growth began.
         """
+        check_cancel(cancel)
         ways, told = _ways_of(problem, planner, settings)
         if not (is_number(seconds) and seconds > 0):
             raise SettingsError("seconds", "a number above 0 [s]", repr(seconds))
@@ -156,7 +159,8 @@ class Roadmap:
         Raises
         ------
         ProblemError
-            A place that is not so many finite numbers.
+            A place that is not so many finite numbers, or a map that has changed since, where that
+            matters. Unaudited routes can't tell.
         OutsideMapError, NonFreeError, UnknownSpaceError
             Start or goal is no place for the footprint.
         EnclosedError
@@ -168,14 +172,21 @@ class Roadmap:
         place = self.problem.clear_place
         problem = replace(self.problem, start=start, goal=goal, cleared_at=place)
         check_on_map(problem)
-        return solve(
-            posed(self.ways.costmap, problem),
-            self,
-            self.settings,
-            began=began,
-            headings=self.ways.space not in FLAT,
-            audited=audit,
-        )
+        try:
+            return solve(
+                posed(self.ways.costmap, problem),
+                self,
+                self.settings,
+                began=began,
+                headings=self.ways.space not in FLAT,
+                audited=audit,
+            )
+        except AuditError as error:
+            if np.array_equal(Costmap.of(problem).blocked, self.ways.costmap.blocked):
+                raise
+            expected = "the map that the roadmap was grown on"
+            hint = "Grow another roadmap."
+            raise ProblemError("grid", expected, "one that has changed", hint=hint) from error
 
     def search(self, start: Pose, goal: Pose, settings: SamplingSettings) -> Found | None:
         """Return a route as planners' engines do, or None if it is proved that there is none.
@@ -228,6 +239,8 @@ class Roadmap:
             Missing, damaged, of another kind or a newer version, or grown over other free cells
             or for another footprint.
         """
+        if not isinstance(problem, PlanningProblem):
+            raise ProblemError("problem", "a PlanningProblem", repr(problem))
         graph, costmap, told = read_roadmap(path, problem)
         assert told.space is not None
         return cls(Ways(costmap, told.space, told.turning_radius), graph, told)

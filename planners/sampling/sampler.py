@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 
 from groundmap.errors import SettingsError
-from planners.answers import check_space
+from planners.answers import check_on_map, check_space
 from planners.costmap import Costmap
 from planners.engine import Cancel, Clock, Found, OnImproved, Pose
 from planners.errors import (
@@ -23,7 +23,8 @@ from planners.sampling.goals import come_near, goal_states
 from planners.sampling.objectives import Objective
 from planners.sampling.progress import Progress
 from planners.sampling.run import REASONS, THREADED, Outcome, Run, Task
-from planners.sampling.settings import FLAT, SamplingSettings, Space, refusal
+from planners.sampling.settings import FLAT, PARAMETERS, SamplingSettings, Space, refusal
+from planners.sampling.simplified import simplified
 from planners.sampling.sliced import EXACT
 from planners.sampling.turns import Ending, turn
 from planners.sampling.warm import better_region, first_states
@@ -137,7 +138,9 @@ class Sampler:
             raise SettingsError("keep_graph", "False for 'bitstar'", "True", hint=reason)
         for name in settings.parameters():
             if not has_parameter(self.name, name):
-                raise SettingsError(name, f"a parameter that {self.name!r} has", "another's")
+                own = [one for one in PARAMETERS if has_parameter(self.name, one)]
+                expected = f"a parameter that {self.name!r} has: {', '.join(own)}"
+                raise SettingsError(name, expected, "another's")
 
     def _task(
         self,
@@ -155,8 +158,13 @@ class Sampler:
             self._state(ways, "goal", goal)
         region = ways.region(begin)
         goals = goal_states(ways, settings, goal, settings.seed, within=region)
+        axes = len(begin) if ways.space in FLAT else 2
+        place = start[:axes] if ways.space in FLAT else start
+        if settings.takes_other_goals and settings.will_do(place, goal, axes=axes):
+            goals = [begin]
         if not goals and settings.takes_other_goals:
             if not goal_states(ways, settings, goal, settings.seed):
+                check_on_map(replace(self.costmap.problem, start=start, goal=goal))
                 check_space(self.costmap, "goal", goal, headings=ways.space not in FLAT)
             if come_near(ways, settings, goal, region):
                 reason = "nowhere near enough to a goal was found that can be reached"
@@ -189,6 +197,8 @@ class Sampler:
         first = first_states(task.ways, *task.asked, task.settings, task.clock)
         if not first:
             return self._found(task, _alone_run(task))
+        if task.settings.simplify:
+            first = simplified(first, task.ways, task.objective, task.clock)
         cost = task.objective.cost(first)
         task.progress.found(cost, task.ways.poses(first))
         if task.progress.enough:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import Field
+import numpy as np
+from pydantic import Field, field_validator
+from pydantic_core import PydanticCustomError
 
 from planners.engine import Pose, SearchSettings
 from planners.footprint import Footprint
@@ -136,6 +138,14 @@ class SamplingSettings(SearchSettings):
     cache_cc: bool | None = Field(None, description="remember which edges were checked")
     heuristics: bool | None = Field(None, description="steer towards the goal")
     extended_fmt: bool | None = Field(None, description="sample on where the first samples fail")
+
+    @field_validator("goals", mode="before")
+    @classmethod
+    def _are_places(cls, goals: Any) -> Any:
+        places = isinstance(goals, (list, tuple, np.ndarray))
+        if not (places and all(isinstance(one, (list, tuple, np.ndarray)) for one in goals)):
+            raise PydanticCustomError("places", "a list of places, such as [[3, 4], [5, 6]]")
+        return [tuple(one) for one in goals]
 
     def heeds_headings(self, problem: PlanningProblem) -> bool:
         """Whether an outline is turned with the robot."""

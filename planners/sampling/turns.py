@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import os
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -55,16 +56,19 @@ if hasattr(os, "register_at_fork"):
 
 @contextmanager
 def turn(clock: Clock) -> Iterator[None]:
-    """Wait until no other search runs, or time is up.
+    """Wait until no other search runs; time that is waited doesn't count.
 
     Raises
     ------
     TimeLimitError, CancelledError
+        Time was up before, or somebody wants no search any more.
     """
-    alone = _alone
+    alone, began = _alone, time.perf_counter()
     while not alone.acquire(timeout=PATIENCE):
-        clock.check(0)
+        if clock.is_cancelled:
+            clock.check(0)
     try:
+        clock.began += time.perf_counter() - began
         clock.check(0)
         yield
     finally:
