@@ -192,6 +192,11 @@ def test_options_of_the_other_bench_are_refused() -> None:
 
 
 def test_who_is_at_a_goal_stays_there() -> None:
+    z = np.full((64, 64), FREE, dtype=np.float32)
+    shifted = grid_of(z, resolution=0.1524, origin=(-7.3, 2.9))
+    ends: dict[str, Any] = {"start": (-3.1, 5.7), "goal": (1.1, 6.3), "footprint": 0.3}
+    problem = PlanningProblem(shifted, **ends, clear_start=False)
+    assert plan(problem, "rrtconnect", goal_radius=5).waypoints.tolist() == [[-3.1, 5.7]] * 2
     for told in ({"goal_radius": 30.0}, {"goals": [[2, 2, 0]]}):
         assert plan(asked(), "rrtconnect", **told).length == 0.0
 

@@ -43,6 +43,8 @@ def found_of(
     if len(goal) >= len(states[-1]) and states[-1] == ways.state_of(goal):
         poses[-1, :axes] = goal[:axes]
     else:
+        if states[-1] == states[0]:  # it is there already
+            poses[-1, :axes] = start[:axes]
         end = tuple(poses[-1].tolist())
     waypoints = np.ascontiguousarray(poses[:, :axes])
     if ways.space in FLAT:
