@@ -176,7 +176,7 @@ def test_a_warm_start_is_never_beaten_by_what_it_began_with(name: str, space: st
     assert route.cost <= improvements[0].cost
     assert len(improvements[0].waypoints) > 1
     if space == "r2":
-        assert improvements[0].cost == pytest.approx(plan(asked, "astar").cost)
+        assert improvements[0].cost <= plan(asked, "astar").cost + 1e-9  # it is pulled tight
 
 
 def test_a_warm_start_brings_a_route_where_chance_finds_none() -> None:
