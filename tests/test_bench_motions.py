@@ -60,13 +60,13 @@ class Posed:
     def __getitem__(self, axis: int) -> float:
         return self.pose[axis]
 
-    def getX(self) -> float:  # noqa: N802
+    def getX(self) -> float:  # noqa: N802 (OMPL's name)
         return self.pose[0]
 
-    def getY(self) -> float:  # noqa: N802
+    def getY(self) -> float:  # noqa: N802 (OMPL's name)
         return self.pose[1]
 
-    def getYaw(self) -> float:  # noqa: N802
+    def getYaw(self) -> float:  # noqa: N802 (OMPL's name)
         return self.pose[2]
 
 

@@ -18,7 +18,7 @@ EDGES = np.array([(0, 1), (1, 2)])
 
 def drawn(vertices: object = VERTICES, edges: object = EDGES) -> LineCollection:
     _, ax = new_figure((0.0, 0.0, 5.0, 5.0))
-    (lines,) = draw_graph(vertices, edges, ax=ax)  # type: ignore[arg-type]
+    (lines,) = draw_graph(vertices, edges, ax=ax)  # type: ignore[arg-type] # what is refused
     assert isinstance(lines, LineCollection)
     assert lines.axes is ax
     return lines

@@ -196,7 +196,7 @@ def test_the_camera_stands_where_base_and_mounting_put_it() -> None:
 
 def test_with_plane_gives_another_view_and_leaves_this_one() -> None:
     view = bare_view(points=Features.points([(0, 0, -1), (0, 0, 1)], spread(2)), timestamp=3.0)
-    plane = GroundPlane(normal=(0.0, -1.0, 0.0), offset=1.5)  # type: ignore[arg-type]
+    plane = GroundPlane(normal=(0.0, -1.0, 0.0), offset=1.5)  # type: ignore[arg-type] # a tuple will do here
     standing = view.with_plane(plane)
     assert view.plane is None
     assert standing.plane is plane

@@ -23,7 +23,7 @@ from planners.errors import ProblemError
 from planners.problem import PlanningProblem
 from planners.sampling.door import logged, ompl
 from planners.sampling.settings import SamplingSettings, Space
-from planners.sampling.states import edge_check, reader, space_of, state_of
+from planners.sampling.states import edge_check, information_of, reader, space_of, state_of
 from planners.sampling.ways import Bounds, Ways
 
 POINTS = 40  # on an outline, that the lambda looks at
@@ -165,19 +165,16 @@ def _information(query: Query, system: str, edges: list[tuple[Pose, Pose]] | Non
     """Return OMPL's space with one of the checks; what is asked is appended to `edges`."""
     base, ways = ompl().base, query.ways
     space = space_of(base, ways.space, query.room, SamplingSettings())
-    information = base.SpaceInformation(space)
     if system == LAMBDA:
+        information = base.SpaceInformation(space)
         information.setStateValidityChecker(lambda_of(ways))
         _set_steps(space, ways)
-    else:
-        information.setStateValidityChecker(base.AllValidStateValidityChecker(information))
-        check = edge_check(ways, count(1), lambda: None)
-        if edges is not None:
-            check = _recording(check, reader(ways.space), edges)
-        motions = type("Motions", (base.MotionValidator,), {"checkMotion": check})
-        information.setMotionValidator(motions(information))
-    information.setup()
-    return information
+        information.setup()
+        return information
+    check = edge_check(ways, count(1), lambda: None)
+    if edges is not None:
+        check = _recording(check, reader(ways.space), edges)
+    return information_of(base, space, check)
 
 
 def _recording(check: Callable[..., bool], read: Any, edges: list[Any]) -> Callable[..., bool]:

@@ -10,7 +10,7 @@ from planners.sampling.door import logged, ompl, samplers
 from planners.sampling.draws import Draws
 from planners.sampling.graph import Graph, graph_of
 from planners.sampling.settings import SamplingSettings
-from planners.sampling.states import drawing, edge_check, space_of
+from planners.sampling.states import drawing, edge_check, information_of, space_of
 from planners.sampling.turns import Ending, turn
 from planners.sampling.ways import Ways, box_of
 
@@ -50,17 +50,13 @@ def grown(
     with turn(Clock(planner, None, Ending(cancel))), logged():
         util.RNG.setSeed(settings.seed + 1)  # 0 is refused
         box = box_of(region, ways.costmap.window.resolution)
-        information = base.SpaceInformation(space_of(base, ways.space, box, settings))
-        # Only clear states are drawn.
-        information.setStateValidityChecker(base.AllValidStateValidityChecker(information))
-        # The class is made here: one that outlives the growth is reported as a leak at exit.
-        check = edge_check(ways, count(1), lambda: None)
-        motions = type("Motions", (base.MotionValidator,), {"checkMotion": check})
-        information.setMotionValidator(motions(information))
+        space = space_of(base, ways.space, box, settings)
+        edge = edge_check(ways, count(1), lambda: None)
         seed, yaw_weight = settings.seed, settings.yaw_weight
         draws = Draws(ways, region, seed=seed, yaw_weight=yaw_weight, first=first)
-        information.setValidStateSamplerAllocator(drawing(base, draws, ways.space))
-        information.setup()
+        # States need no check, as only clear ones are drawn.
+        sampler = drawing(base, draws, ways.space)
+        information = information_of(base, space, edge, sampler=sampler)
         prm = getattr(geometric, samplers()[planner])(information)
         if settings.max_nearest_neighbors is not None:
             prm.setMaxNearestNeighbors(settings.max_nearest_neighbors)

@@ -26,6 +26,7 @@ from planners.sampling.states import (
     drawing,
     edge_check,
     goal_of,
+    information_of,
     reader,
     space_of,
     state_check,
@@ -142,16 +143,10 @@ class Run:
     def _information(self, space: Any) -> Any:
         """Return the space with our own checks of states and edges, and our own samples."""
         base, task = self.ompl.base, self.task
-        information = base.SpaceInformation(space)
-        if task.name in BY_EDGES:
-            information.setStateValidityChecker(base.AllValidStateValidityChecker(information))
-        else:
-            is_clear = self._guarded(state_check(self.ways, self._look))
-            information.setStateValidityChecker(is_clear)
-        # The class is made here: one that outlives the search is reported as a leak at exit.
-        check = self._guarded(edge_check(self.ways, self.edges, self._look))
-        motions = type("Motions", (base.MotionValidator,), {"checkMotion": check})
-        information.setMotionValidator(motions(information))
+        state = None
+        if task.name not in BY_EDGES:
+            state = self._guarded(state_check(self.ways, self._look))
+        edge = self._guarded(edge_check(self.ways, self.edges, self._look))
         draws = Draws(
             self.ways,
             task.region,
@@ -159,9 +154,8 @@ class Run:
             yaw_weight=self.settings.yaw_weight,
             first=task.first,
         )
-        information.setValidStateSamplerAllocator(drawing(base, draws, self.ways.space))
-        information.setup()
-        return information
+        sampler = drawing(base, draws, self.ways.space)
+        return information_of(base, space, edge, state=state, sampler=sampler)
 
     def _guarded(self, check: Callable[..., bool]) -> Callable[..., bool]:
         return guarded(check, self.errors) if self.task.name in THREADED else check

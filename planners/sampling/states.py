@@ -38,6 +38,30 @@ def space_of(base: Any, space: Space, room: Bounds, settings: SamplingSettings) 
     return made
 
 
+def information_of(
+    base: Any,
+    space: Any,
+    edge: Callable[..., bool],
+    *,
+    state: Callable[[Any], bool] | None = None,
+    sampler: Callable[[Any], Any] | None = None,
+) -> Any:
+    """Return a space of OMPL's with our own checks of edges and states, and our own samples.
+
+    Without a check of states, all are taken for clear.
+    """
+    information = base.SpaceInformation(space)
+    all_valid = base.AllValidStateValidityChecker(information)
+    information.setStateValidityChecker(all_valid if state is None else state)
+    # The class is made here: one that outlives the search is reported as a leak at exit.
+    motions = type("Motions", (base.MotionValidator,), {"checkMotion": edge})
+    information.setMotionValidator(motions(information))
+    if sampler is not None:
+        information.setValidStateSamplerAllocator(sampler)
+    information.setup()
+    return information
+
+
 def state_of(space: Any, pose: Pose, kind: Space) -> Any:
     """Return a state of OMPL's."""
     state = space.allocState()

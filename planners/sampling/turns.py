@@ -46,7 +46,7 @@ atexit.register(_leave)
 
 def _renew() -> None:
     """Take a new lock: a process that was forked off during a search has nobody who ends it."""
-    global _alone  # noqa: PLW0603
+    global _alone  # noqa: PLW0603 (a lock is the process's own)
     _alone = threading.RLock()
 
 
