@@ -41,6 +41,7 @@ def evaluate(
     *,
     watch: Callable[[list[Any]], Iterable[Any]] = iter,
     ground: dict[str, Any] | None = None,
+    camera_height: float | None = None,
     **settings: Any,
 ) -> dict[str, Verdict]:
     """Map a part of a log and judge the map by the rest, in three ways and with a baseline.
@@ -57,6 +58,9 @@ def evaluate(
         Wraps the list of steps, to show progress.
     ground : dict, optional
         `groundmap.settings.GroundSettings` of the maps; the judge keeps its own.
+    camera_height : float, optional [m]
+        Level ground that far below the camera, for the maps and the judge, instead of fitted
+        planes.
     **settings
         `groundmap.settings.MapperSettings`.
 
@@ -65,7 +69,8 @@ def evaluate(
     InputError
         Fewer than five views, or landmarks without ids.
     """
-    judged = list(fit_ground(views))
+    judged = list(fit_ground(views, camera_height=camera_height))
+    standing = {**(ground or {}), "camera_height": camera_height}
     _check_log(judged)
     trajectory = np.array([view.T_map_base[:2, 3] for view in judged])
     tallies = dict.fromkeys(PROTOCOLS, Tally())
@@ -73,7 +78,7 @@ def evaluate(
     for name, fold in watch([(name, fold) for name in PROTOCOLS for fold in range(FOLDS)]):
         split, mapped_by = PROTOCOLS[name]
         parts = [split(fold, number, view) for number, view in enumerate(judged)]
-        grid = mapped_by((view for view, _ in parts if view is not None), settings, ground or {})
+        grid = mapped_by((view for view, _ in parts if view is not None), settings, standing)
         held_out = sort_by_height(view for _, view in parts if view is not None)
         tallies[name] = tallies[name].plus(judge(grid, held_out, trajectory))
         verdicts[name] = Verdict(tallies[name].figures(), grid, held_out)

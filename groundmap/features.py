@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,8 @@ from groundmap.frames import check_transform
 
 if TYPE_CHECKING:
     from groundmap.ground import GroundPlane
+
+COVARIANCE_TOLERANCE = 1e-5  # of the largest entry: what text with five digits is off
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +35,8 @@ class Features:
     Raises
     ------
     InputError
-        Shapes that do not belong together.
+        Shapes that do not belong together; from `points` and `segments`, a covariance that is not
+        symmetric and positive semi-definite, too.
     """
 
     xyz: Floats
@@ -75,6 +78,10 @@ class Features:
     ) -> Features:
         positions = as_floats("xyz", xyz, (None, *ends, 3))
         spread = as_floats("covariance", covariance, (None, *ends, 3, 3))
+        wrong = wrong_covariance(spread)
+        if wrong is not None:
+            where = f"index {wrong.row}"
+            raise InputError("covariance", wrong.expected, wrong.got, where=where)
         if ids is None:
             return cls(positions, spread, np.full(len(positions), -1, dtype=np.int64))
         return cls(positions, spread, _as_ids("ids", ids))
@@ -158,10 +165,10 @@ class View:
         return cls(
             T_map_base=np.asarray(T_map_base, dtype=np.float64),
             rig=rig,
-            points=Features.points(
+            points=Features(
                 points.xyz, points.covariance, _kept(point_ids, points.kept, "point_ids")
             ),
-            segments=Features.segments(
+            segments=Features(
                 segments.xyz, segments.covariance, _kept(segment_ids, segments.kept, "segment_ids")
             ),
             timestamp=timestamp,
@@ -178,9 +185,61 @@ class View:
         return replace(self, plane=plane)
 
 
-def _kept(ids: npt.ArrayLike | None, kept: npt.NDArray[np.bool_], name: str) -> Ints | None:
-    if ids is None:
+class WrongCovariance(NamedTuple):
+    """The first covariance that none can be."""
+
+    row: int  #: index of the feature
+    expected: str
+    got: str
+
+
+def wrong_covariance(covariance: Floats) -> WrongCovariance | None:
+    """Return the first feature whose covariance is not symmetric or has a negative eigenvalue.
+
+    Rounding is allowed for, to `COVARIANCE_TOLERANCE` of the largest entry; what is not finite is
+    passed over, since views drop and count it.
+
+    Parameters
+    ----------
+    covariance : ndarray, shape (n, 3, 3) or (n, 2, 3, 3) [m²]
+
+    Examples
+    --------
+    >>> wrong_covariance(np.array([np.eye(3), np.diag([1.0, 1.0, -0.5])]))
+    WrongCovariance(row=1, expected='a positive semi-definite matrix', got='the eigenvalue -0.5')
+    """
+    matrices = covariance.reshape(-1, 3, 3)
+    finite = np.flatnonzero(np.isfinite(matrices).all(axis=(1, 2)))
+    matrices = matrices[finite]
+    largest = np.abs(matrices).max(axis=(1, 2), initial=0.0)
+    scaled = matrices / np.where(largest > 0, largest, 1.0)[:, None, None]
+    skew = np.abs(scaled - np.swapaxes(scaled, 1, 2)).max(axis=(1, 2), initial=0.0)
+    lowest = np.linalg.eigvalsh(scaled)[:, 0]
+    wrong = np.flatnonzero((skew > COVARIANCE_TOLERANCE) | (lowest < -COVARIANCE_TOLERANCE))
+    if not len(wrong):
         return None
+    first = wrong[0]
+    row = int(finite[first]) // (len(covariance.reshape(-1, 3, 3)) // len(covariance))
+    if skew[first] > COVARIANCE_TOLERANCE:
+        off = skew[first] * largest[first]
+        return WrongCovariance(row, "a symmetric matrix", f"entries that differ by {off:.3g}")
+    eigenvalue = lowest[first] * largest[first]
+    return WrongCovariance(
+        row, "a positive semi-definite matrix", f"the eigenvalue {eigenvalue:.3g}"
+    )
+
+
+def sigma_along(direction: Floats, covariance: Floats) -> Floats:
+    """Return the standard deviation along a unit vector, shape (...), of (..., 3, 3) [m]."""
+    variance = np.einsum("i,...ij,j->...", direction, covariance, direction)
+    # What was rounded may be a little below 0 in a direction that is known exactly.
+    sigma: Floats = np.sqrt(np.maximum(variance, 0.0))
+    return sigma
+
+
+def _kept(ids: npt.ArrayLike | None, kept: npt.NDArray[np.bool_], name: str) -> Ints:
+    if ids is None:
+        return np.full(int(kept.sum()), -1, dtype=np.int64)
     array = _as_ids(name, ids)
     if array.shape != kept.shape:
         raise InputError(name, f"shape {kept.shape}", f"shape {array.shape}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
@@ -10,10 +10,11 @@ import numpy as np
 
 from groundmap.arrays import Floats
 from groundmap.camera import StereoRig
+from groundmap.diagnosis import describe_dropped, likely_mistakes, upright_views
 from groundmap.errors import InputError, NoGroundPlaneError
-from groundmap.features import View
+from groundmap.features import View, sigma_along
 from groundmap.frames import invert
-from groundmap.ground import TILT_FLOOR, GroundPlane, check_camera
+from groundmap.ground import TILT_FLOOR, GroundPlane, check_plane
 from groundmap.settings import GroundSettings
 
 REACH = 3.0  # [max_range], features farther from the camera are of another place
@@ -27,6 +28,10 @@ TILTS = np.stack(
 SIGMA_TILT_OF_BASE = 0.02  # [rad], of base_link against the ground it stands on
 BIN = 0.1  # [m], height bins of the search
 TOLERANCES = (0.4, 0.3, 0.2, 0.15, 0.15, 0.15)  # [m], of the refinement's steps
+GIVE_THE_GROUND = (
+    "give the camera's height above the ground (camera_height=..., --camera-height), or "
+    "T_base_camera in the rig, so that base_link tells where the ground is."
+)
 WORST_CONDITION = 1e12  # of the information matrix: beyond this, all features are on one line
 
 
@@ -69,26 +74,36 @@ def fit_ground(
     if plane is not None and camera_height is not None:
         raise InputError("fit_ground", "plane or camera_height", "both")
     if plane is not None or camera_height is not None:
-        return _with_given_plane(views, plane, camera_height)
+        return _with_given_plane(views, plane, camera_height, options)
     return _with_fitted_plane(views, options)
 
 
 def _with_fitted_plane(views: Iterable[View], options: GroundSettings) -> Iterator[View]:
     last: GroundPlane | None = None
-    for view, window in _windows(views, options):
+    for number, (view, window) in enumerate(_windows(views, options)):
         last = _fit(view, window, options) or last
         if last is None:
-            last = _ground_of_base(view, window)
-        yield view.with_plane(last)
+            last = _ground_of_base(view, window, options)
+        yield _standing(view, last, number)
         last = GroundPlane(normal=last.normal, offset=last.offset, sigma_tilt=last.sigma_tilt)
 
 
 def _with_given_plane(
-    views: Iterable[View], plane: GroundPlane | None, camera_height: float | None
+    views: Iterable[View],
+    plane: GroundPlane | None,
+    camera_height: float | None,
+    options: GroundSettings,
 ) -> Iterator[View]:
-    for view in views:
-        check_camera(view)
-        yield view.with_plane(plane or GroundPlane.below_camera(view.rig, camera_height or 0.0))
+    for number, view in upright_views(views, causal=options.causal):
+        below = plane or GroundPlane.below_camera(view.rig, camera_height or 0.0)
+        yield _standing(view, below, number)
+
+
+def _standing(view: View, plane: GroundPlane, number: int) -> View:
+    """Return the view on a plane, however it was found: none is at or above the camera."""
+    standing = view.with_plane(plane)
+    check_plane(standing, number=number)
+    return standing
 
 
 class _Seen(NamedTuple):
@@ -100,7 +115,6 @@ class _Seen(NamedTuple):
 
 
 def _seen(view: View, options: GroundSettings) -> _Seen:
-    check_camera(view)
     segments = view.segments
     xyz = np.concatenate([view.points.xyz, segments.xyz.reshape(-1, 3)])
     covariance = np.concatenate([view.points.covariance, segments.covariance.reshape(-1, 3, 3)])
@@ -108,7 +122,7 @@ def _seen(view: View, options: GroundSettings) -> _Seen:
     T_map_camera = view.T_map_camera
     points = xyz[near] @ T_map_camera[:3, :3].T + T_map_camera[:3, 3]
     up = T_map_camera[2, :3]
-    return _Seen(view, points, np.sqrt(np.einsum("i,nij,j->n", up, covariance[near], up)))
+    return _Seen(view, points, sigma_along(up, covariance[near]))
 
 
 def _windows(views: Iterable[View], options: GroundSettings) -> Iterator[tuple[View, list[_Seen]]]:
@@ -117,7 +131,8 @@ def _windows(views: Iterable[View], options: GroundSettings) -> Iterator[tuple[V
     behind = options.window - 1 - ahead
     held: deque[_Seen] = deque()
     here = 0  # index in `held` of the next view to hand out
-    for seen in _then_nothing((_seen(view, options) for view in views), times=ahead):
+    read = (_seen(view, options) for _, view in upright_views(views, causal=options.causal))
+    for seen in _then_nothing(read, times=ahead):
         if seen is not None:
             held.append(seen)
         if here < len(held) and (seen is None or len(held) - here > ahead):
@@ -144,11 +159,16 @@ class _Cloud(NamedTuple):
 
 
 def _fit(view: View, window: list[_Seen], options: GroundSettings) -> GroundPlane | None:
-    """Return the plane under `view`, or None where too few features lie on one."""
+    """Return the plane under `view`, or None where too few features lie on one.
+
+    Its distance from the camera is within ``lowest_camera`` and ``highest_camera``.
+    """
     cloud = _cloud(view, window, options)
     if len(cloud.points) < options.min_support:
         return None
-    plane = _search(cloud.points, np.sqrt(cloud.weights))
+    plane = _search(cloud.points, np.sqrt(cloud.weights), options)
+    if plane is None:
+        return None
     for tolerance in TOLERANCES:
         refined = _refine(cloud, plane, tolerance, options.min_support)
         if refined is None:
@@ -160,6 +180,9 @@ def _fit(view: View, window: list[_Seen], options: GroundSettings) -> GroundPlan
     normal /= np.linalg.norm(normal)
     tilt = np.sqrt(np.diag(np.linalg.inv(information))[:2].sum())
     camera_height = -c * up[2]
+    # The features are below the camera, but a plane through them may rise above it on the way here.
+    if not options.lowest_camera <= camera_height <= options.highest_camera:
+        return None
     return GroundPlane(
         normal=normal,
         offset=float(camera_height - normal @ view.rig.T_base_camera[:3, 3]),
@@ -200,11 +223,11 @@ def _refine(
     return np.linalg.solve(information, design.T @ (weights * z)), information, support
 
 
-def _search(points: Floats, weights: Floats) -> Floats:
+def _search(points: Floats, weights: Floats, options: GroundSettings) -> Floats | None:
     """Find the plane (a, b, c) below the camera that holds most features and has few below it.
 
     A Hough transform over pitch, roll and height: deterministic, and it takes the whole window
-    at once.
+    at once. None where every candidate is too near below the camera, too far below or above it.
     """
     bins = np.floor((points[:, 2] - TILTS @ points[:, :2].T) / BIN).astype(np.int64)
     lowest = int(bins.min())
@@ -219,8 +242,14 @@ def _search(points: Floats, weights: Floats) -> Floats:
     padded = np.pad(votes, ((0, 0), (2, 1)))
     held = votes + padded[:, 1:-2] + padded[:, 3:]
     below = np.cumsum(padded, axis=1)[:, :columns]
-    tilt, column = np.unravel_index(int(np.argmax(held - 0.5 * below)), votes.shape)
-    return np.array([*TILTS[tilt], (lowest + column + 0.5) * BIN])
+    intercepts = (lowest + np.arange(columns) + 0.5) * BIN
+    camera_heights = -intercepts / np.sqrt(1.0 + (TILTS**2).sum(axis=1))[:, None]
+    allowed = (camera_heights >= options.lowest_camera) & (camera_heights <= options.highest_camera)
+    if not allowed.any():
+        return None
+    score = np.where(allowed, held - 0.5 * below, -np.inf)
+    tilt, column = np.unravel_index(int(np.argmax(score)), votes.shape)
+    return np.array([*TILTS[tilt], intercepts[column]])
 
 
 def _level_axes(rig: StereoRig) -> Floats:
@@ -232,12 +261,21 @@ def _level_axes(rig: StereoRig) -> Floats:
     return np.stack([forward, np.cross(up, forward), up])
 
 
-def _ground_of_base(view: View, window: list[_Seen]) -> GroundPlane:
+def _ground_of_base(view: View, window: list[_Seen], options: GroundSettings) -> GroundPlane:
     if view.rig.is_mounted:
         return GroundPlane(normal=view.rig.up, offset=0.0, sigma_tilt=SIGMA_TILT_OF_BASE)
+    views = [seen.view for seen in window]
     seen = sum(len(seen.points) for seen in window)
+    dropped = sum((view.dropped for view in views), Counter[str]())
+    dropped["out_of_range"] = sum(_size(view) for view in views) - seen
     raise NoGroundPlaneError(
-        f"no plane below the camera holds enough of the {seen} features of {len(window)} views: "
-        "give the camera's height above the ground (camera_height=..., --camera-height), or "
-        "T_base_camera in the rig, so that base_link tells where the ground is."
+        f"no plane between {options.lowest_camera:g} and {options.highest_camera:g} m below the "
+        f"camera holds enough of the {seen} features of {len(window)} views"
+        f"{f' (dropped: {describe_dropped(+dropped)})' if dropped.total() else ''}: "
+        + (" ".join(likely_mistakes(views)) or GIVE_THE_GROUND)
     )
+
+
+def _size(view: View) -> int:
+    """Return how many features the fit gets from a view: points, and both ends of segments."""
+    return len(view.points) + 2 * len(view.segments)

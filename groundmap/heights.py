@@ -14,9 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from groundmap.arrays import Bools, Floats, Ints
-from groundmap.errors import NoGroundPlaneError
-from groundmap.features import Features, View
-from groundmap.ground import GroundPlane, check_camera
+from groundmap.features import Features, View, sigma_along
+from groundmap.ground import GroundPlane, check_camera, check_plane
 from groundmap.settings import MapperSettings
 from groundmap.spans import inside_circle, where_positive
 
@@ -71,24 +70,23 @@ class _Heights(NamedTuple):
         )
 
 
-def flatten(view: View, settings: MapperSettings) -> FlatView:
+def flatten(view: View, settings: MapperSettings, *, number: int | None = None) -> FlatView:
     """Project a view to its ground plane and sort its features by height.
 
     Ground features lie within max(step_height, 2 sigma_h + r sigma_tilt) of the plane; obstacle
     features above that, up to the robot's height; higher ones are overhead, lower ones below
-    ground. A segment that leaves the obstacle band is clipped to it.
+    ground. A segment that leaves the obstacle band is clipped to it. `number` is the index of the
+    view in its log, for error messages.
 
     Raises
     ------
     NoGroundPlaneError
-        The view carries no plane, or its camera looks at the ground or the sky.
+        The view has no plane, or one that is not below its camera; the camera looks at the ground
+        or the sky.
     """
-    if view.plane is None:
-        raise NoGroundPlaneError(
-            "the view has no ground plane: expected views from groundmap.fit_ground(views), or "
-            "view.with_plane(plane)"
-        )
-    check_camera(view)
+    check_plane(view, number=number)
+    check_camera(view, number=number)
+    assert view.plane is not None
     plane = view.plane
     T_map_camera = view.T_map_camera
     forward = T_map_camera[:2, 2] / np.hypot(T_map_camera[0, 2], T_map_camera[1, 2])
@@ -142,7 +140,7 @@ def _measure(
     up = view.rig.T_base_camera[:3, :3].T @ plane.normal
     height = up[0] * x + up[1] * y + up[2] * z
     height += float(plane.height(view.rig.T_base_camera[:3, 3]))
-    sigma = np.sqrt(np.einsum("i,...ij,j->...", up, features.covariance, up))
+    sigma = sigma_along(up, features.covariance)
     tolerance = np.maximum(settings.step_height, 2.0 * sigma + radius * plane.sigma_tilt)
     # Both ends of a segment carry its number.
     number = np.arange(len(features)).reshape(-1, *(1,) * (radius.ndim - 1)) + np.zeros_like(

@@ -104,7 +104,8 @@ class GroundMapper:
         Raises
         ------
         NoGroundPlaneError
-            The view has no plane, or its camera looks at the ground or the sky.
+            The view has no plane, or one that is not below its camera; the camera looks at the
+            ground or the sky.
         """
         parts = self.explain(view)
         with self.stages.timed("fuse"):
@@ -123,7 +124,8 @@ class GroundMapper:
     def explain(self, view: View) -> ViewParts:
         """Return what `integrate` would fuse, with every step on the way; changes nothing."""
         with self.stages.timed("heights"):
-            flat = smoothed(flatten(view, self.settings), self.settings)
+            flat = flatten(view, self.settings, number=self.stats.views)
+            flat = smoothed(flat, self.settings)
         with self.stages.timed("triangulate"):
             mesh = triangulate(flat.points, flat.segments)
         with self.stages.timed("surfaces"):

@@ -16,7 +16,8 @@ class Settings(BaseModel):
     Raises
     ------
     SettingsError
-        A key that does not exist (the nearest one is named), or a value out of range.
+        A key that does not exist (the nearest one is named), a value out of range, or values that
+        do not fit together (`check`).
 
     Examples
     --------
@@ -48,6 +49,16 @@ unknown key. Did you mean 'resolution'?
                 raise SettingsError(name, "a value", "none") from None
             expected = first["msg"].removeprefix("Input should be ")
             raise SettingsError(name, expected, repr(first["input"])) from None
+        self.check()
+
+    def check(self) -> None:
+        """Raise `SettingsError` where valid fields do not fit together; a class may override it."""
+
+    def check_order(self, lower: str, upper: str) -> None:
+        """Raise `SettingsError` where the first of two fields is above the second."""
+        least, most = getattr(self, lower), getattr(self, upper)
+        if least > most:
+            raise SettingsError(lower, f"at most {upper}, {most:g}", f"{least:g}")
 
 
 def _nearest(key: str, known: list[str]) -> str:
@@ -101,6 +112,11 @@ class MapperSettings(Settings):
     )
     support_angle: float = Field(0.05, gt=0, description="its upper bound as a bearing [rad]")
 
+    def check(self) -> None:
+        """Refuse ranges and heights out of order."""
+        self.check_order("min_range", "max_range")
+        self.check_order("step_height", "robot_height")
+
 
 class GroundSettings(Settings):
     """All that `groundmap.fit_ground` can be told."""
@@ -111,3 +127,7 @@ class GroundSettings(Settings):
     lowest_camera: float = Field(0.1, gt=0, description="least height of the camera [m]")
     highest_camera: float = Field(5.0, gt=0, description="greatest height of the camera [m]")
     min_support: int = Field(12, ge=3, description="least features on a plane [features]")
+
+    def check(self) -> None:
+        """Refuse camera heights out of order."""
+        self.check_order("lowest_camera", "highest_camera")

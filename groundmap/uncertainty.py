@@ -31,7 +31,8 @@ class Ellipsoid:
         covariance : ndarray, shape (n, 2, 2) [m², view]
         """
         ray = _unit(xy)
-        sigma: Floats = np.sqrt(np.einsum("ni,nij,nj->n", ray, covariance, ray))
+        variance = np.einsum("ni,nij,nj->n", ray, covariance, ray)
+        sigma: Floats = np.sqrt(np.maximum(variance, 0.0))  # rounded, it may be a little below 0
         return sigma
 
     def core_radius(self, resolution: float) -> float:

@@ -18,7 +18,8 @@ from rich.progress import track
 
 T = TypeVar("T")
 
-LISTS = ("waypoints", "headings")  # of a route: in its file, not in the table for people
+# Not in the table for people: of a route, these are in its file; warnings are on stderr.
+LISTS = ("waypoints", "headings", "warnings")
 SAY_EVERY = 2.0  # [s], between two lines of progress where there is no terminal
 
 JsonOption = Annotated[

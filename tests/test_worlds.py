@@ -123,7 +123,7 @@ def test_an_unknown_setting_is_refused() -> None:
         ("parking", {"occupancy": 1.5}, "occupancy: expected less than or equal to 1"),
         ("forest", {"bounds": (0, 0, 2, 9)}, "bounds: expected sides of 2.9 or more"),
         ("forest", {"bounds": (5, 0, 2, 9)}, "bounds: expected XMIN < XMAX"),
-        ("forest", {"min_radius": 0.3}, "min_radius: expected at most the max_radius, got 0.3"),
+        ("forest", {"min_radius": 0.3}, "min_radius: expected at most max_radius, 0.25, got 0.3"),
         ("image", {"path": "a.map", "crop": (0, 3, 4, 3)}, "crop: expected XMIN < XMAX"),
     ],
 )

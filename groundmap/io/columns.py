@@ -14,7 +14,7 @@ import numpy.typing as npt
 from groundmap.arrays import Floats
 from groundmap.camera import StereoRig
 from groundmap.errors import FileFormatError
-from groundmap.features import Features
+from groundmap.features import Features, WrongCovariance, wrong_covariance
 from groundmap.io.rows import record
 
 Kind = Literal["points", "segments"]
@@ -69,8 +69,20 @@ class Layout:
             xyz, covariance, kept, dropped = rig.triangulate(values)
             return Features(xyz, covariance, ids[kept]), dropped
         # Copies, so that a view does not keep the table it came from in memory.
-        xyz, covariance = values[..., :3].copy(), values[..., 3:][..., SYMMETRIC]
+        xyz, covariance = values[..., :3].copy(), _covariance(values)
         return Features(xyz, covariance, ids.copy()), Counter()
+
+    def wrong_covariance(self, rows: npt.NDArray[Any]) -> WrongCovariance | None:
+        """Return the first row with a covariance that none can be."""
+        if self.fields == PIXEL_FIELDS:
+            return None
+        values = rows["values"].reshape(len(rows), self.ends, len(self.fields))
+        return wrong_covariance(_covariance(values))
+
+
+def _covariance(values: Floats) -> Floats:
+    covariance: Floats = values[..., 3:][..., SYMMETRIC]
+    return covariance
 
 
 LAYOUTS: dict[Kind, tuple[Layout, Layout]] = {

@@ -20,6 +20,8 @@ from groundmap.io.columns import KINDS, LARGEST_ID, LAYOUTS, Kind, Layout, find_
 from groundmap.io.rows import opened, read_rows
 from groundmap.io.view_order import first_wrong, split_by_view
 
+COVARIANCE = "a covariance that is "
+
 
 class ViewFeatures(NamedTuple):
     """What a table says of one view."""
@@ -70,6 +72,10 @@ class CsvTable(FeatureTable):
                     line=int(lines[wrong.row]),
                     hint=wrong.hint,
                 )
+            bad = self.layout.wrong_covariance(values)
+            if bad is not None:
+                line = int(lines[bad.row])
+                raise FileFormatError(self.path, COVARIANCE + bad.expected, bad.got, line=line)
             yield values
             last = int(values["view"][-1])
 
@@ -86,6 +92,10 @@ class ArrayTable(FeatureTable):
         if wrong is not None:
             got = f"{wrong.got} in row {wrong.row}"
             raise FileFormatError(self.path, wrong.expected, got, hint=wrong.hint)
+        bad = self.layout.wrong_covariance(self.rows)
+        if bad is not None:
+            got = f"{bad.got} in row {bad.row}"
+            raise FileFormatError(self.path, COVARIANCE + bad.expected, got)
         yield self.rows
 
 

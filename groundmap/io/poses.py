@@ -23,6 +23,7 @@ from groundmap.frames import check_transform, from_quaternion
 from groundmap.io.rows import Rows, opened, read_rows, record
 
 TUM_ROW, GTSAM_ROW = record([], 8), record(["id"], 16)
+KITTI_COLUMNS = 12
 # Programs print time stamps with as few as three decimals.
 TIMESTAMP_TOLERANCE = 1e-3
 
@@ -43,6 +44,14 @@ def read_tum(path: Path) -> Poses:
     FileFormatError
         No pose, a timestamp that is not finite, a quaternion whose length is not 1.
     """
+    if len(_first_row(path)) == KITTI_COLUMNS:
+        raise FileFormatError(
+            path,
+            "8 columns, timestamp tx ty tz qx qy qz qw",
+            f"{KITTI_COLUMNS}",
+            hint="Rows of 12 numbers are KITTI's 3 x 4 matrices: write each as a timestamp, "
+            "translation and quaternion.",
+        )
     rows = _all_rows(path, TUM_ROW)
     values = rows.values["values"]
     for line, timestamp in zip(rows.lines, values[:, 0], strict=True):
@@ -67,9 +76,12 @@ def read_gtsam(path: Path) -> Poses:
 
 def read_poses(path: Path) -> Poses:
     """Read poses in either form, told apart by the number of columns."""
+    return read_gtsam(path) if len(_first_row(path)) == 1 + 16 else read_tum(path)
+
+
+def _first_row(path: Path) -> list[str]:
     with opened(path) as stream:
-        first = next((text for line in stream if (text := line.partition("#")[0].split())), [])
-    return read_gtsam(path) if len(first) == 1 + 16 else read_tum(path)
+        return next((text for line in stream if (text := line.partition("#")[0].split())), [])
 
 
 def check_unique(path: Path, poses: Poses) -> None:

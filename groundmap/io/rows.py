@@ -16,6 +16,7 @@ from groundmap.errors import FileFormatError
 
 CHUNK_LINES = 65_536
 SHOWN_CHARACTERS = 60
+SEPARATORS = {None: "white space", ",": "commas", ";": "semicolons"}
 
 
 class Rows(NamedTuple):
@@ -126,17 +127,25 @@ def _offence(
     first = next(i for i, line in enumerate(text) if not _parses(line, row, delimiter))
     line, integers = text[first], len(row.names or ()) - 1
     expected, found = integers + row["values"].shape[0], len(line.split(delimiter))
+    number, hint = int(lines[first]), _hint(line, expected, delimiter)
     if found != expected:
-        return FileFormatError(
-            path,
-            f"{expected} columns",
-            str(found),
-            line=int(lines[first]),
-            hint="Was the file cut short?" if found < expected else "",
-        )
+        if not hint and found < expected:
+            hint = "Was the file cut short?"
+        return FileFormatError(path, f"{expected} columns", str(found), line=number, hint=hint)
     leading = f", the first {integers} integers" if integers else ""
     shown = repr(line[:SHOWN_CHARACTERS])
-    return FileFormatError(path, f"{expected} numbers{leading}", shown, line=int(lines[first]))
+    return FileFormatError(path, f"{expected} numbers{leading}", shown, line=number, hint=hint)
+
+
+def _hint(line: str, expected: int, delimiter: str | None) -> str:
+    """Return what to do about a row with another separator, or with decimal commas; else ''."""
+    wanted = SEPARATORS.get(delimiter, repr(delimiter))
+    for separator, name in SEPARATORS.items():
+        if separator != delimiter and len(line.split(separator)) == expected:
+            return f"Columns are separated by {wanted} in this file, not by {name}."
+    if delimiter is None and len(line.split()) == expected and "," in line:
+        return "Numbers have a decimal point, not a comma."
+    return ""
 
 
 def _parses(line: str, row: np.dtype[Any], delimiter: str | None) -> bool:

@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from groundmap.arrays import Bools, Floats, Ints
+from groundmap.errors import SettingsError
 from groundmap.settings import Settings
 
 UL, UR = 0, 1  # columns of a matched pixel; the third is v
@@ -30,6 +31,13 @@ class MatchingSettings(Settings):
     fragments: float = Field(
         0.0, ge=0, le=1, description="of segments: broken in two, with a gap between"
     )
+
+    def check(self) -> None:
+        """Refuse disparities of false matches out of order."""
+        low, high = self.false_disparity_px
+        if low > high:
+            expected = "two disparities in ascending order [px]"
+            raise SettingsError("false_disparity_px", expected, f"{low:g}, {high:g}")
 
 
 def match(

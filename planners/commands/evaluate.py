@@ -22,6 +22,10 @@ def evaluate_command(
     plot: Annotated[
         Path | None, typer.Option(help="Draw the map and the held-out features: .png, .pdf, .svg.")
     ] = None,
+    camera_height: Annotated[
+        float | None,
+        typer.Option(help="Height of the camera above level ground [m]; default: fitted."),
+    ] = None,
     config: ConfigOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -34,7 +38,13 @@ def evaluate_command(
         return watched(steps, total=len(steps), what="mapping and judging")
 
     settings = read_settings(config)
-    verdicts = evaluate(log, watch=watch, ground=settings["ground"], **settings["mapper"])
+    verdicts = evaluate(
+        log,
+        watch=watch,
+        ground=settings["ground"],
+        camera_height=camera_height,
+        **settings["mapper"],
+    )
     if plot is not None:
         _draw(verdicts["views"], plot)
     figures = {name: asdict(verdict.figures) for name, verdict in verdicts.items()}

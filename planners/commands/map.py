@@ -7,13 +7,14 @@ from typing import Annotated, Any
 
 import typer
 
-from groundmap import CellState, GroundMapper, fit_ground, read_views
+from groundmap import CellState, GroundMapper, View, fit_ground, read_views
 from groundmap.archive import check_writable
+from groundmap.diagnosis import SAMPLE, describe_dropped, likely_mistakes
 from groundmap.errors import InputError
 from groundmap.mapper import warm_up
 from groundmap.stages import Stages
 from planners.commands.settings_file import ConfigOption, read_settings
-from planners.console import JsonOption, emit, seconds_since_start, watched
+from planners.console import JsonOption, emit, say, seconds_since_start, watched
 
 NOT_MAPPING = {"startup", "read", "compile", "save", "other"}
 
@@ -67,11 +68,34 @@ def map_command(
     if total == 0:
         raise InputError(str(source), "at least one view", "none")
     views = fit_ground(stages.each("read", log), camera_height=camera_height, **tables["ground"])
+    sample: list[View] = []
     for view in watched(stages.each("ground", views), total=total, what="mapping views"):
         mapper.integrate(view)
+        if len(sample) < SAMPLE:
+            sample.append(view)
+    warnings = _warnings(mapper, sample)
+    for warning in warnings:
+        say(f"warning: {warning}")
     with stages.timed("save"):
         mapper.grid.save(out)
-    emit(_summary(mapper, stages, out), as_json=as_json, title=f"map of {source}")
+    summary = _summary(mapper, stages, out) | {"warnings": warnings}
+    emit(summary, as_json=as_json, title=f"map of {source}")
+
+
+def _warnings(mapper: GroundMapper, sample: list[View]) -> list[str]:
+    """Return what is likely wrong with a log, or with its map."""
+    warnings = likely_mistakes(sample)
+    if mapper.grid.area(CellState.FREE) == 0:
+        stats = mapper.stats
+        total = stats.features_used + stats.features_dropped.total()
+        dropped = describe_dropped(stats.features_dropped)
+        reasons = f" (dropped: {dropped})" if dropped else ""
+        warnings.insert(
+            0,
+            f"the map has no free cell: {stats.features_used:,} of {total:,} features of "
+            f"{stats.views} views were used{reasons}.",
+        )
+    return warnings
 
 
 def _summary(mapper: GroundMapper, stages: Stages, out: Path) -> dict[str, Any]:

@@ -2,82 +2,30 @@
 
 from __future__ import annotations
 
-import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any
 
 from pydantic import Field
 
-from groundmap.errors import FileFormatError, InputError, SettingsError
+from groundmap.errors import FileFormatError, InputError
 from groundmap.settings import GroundSettings, MapperSettings, Settings
 from groundmap.simulate.drive import DriveSettings
 from groundmap.simulate.parts import HoleSettings, SolidSettings
 from groundmap.simulate.scan import ScanSettings
 from groundmap.simulate.sensor import SensorSettings
 from groundmap.simulate.worlds import GENERATORS, WorldGenerator
-from planners.errors import ProblemError
-from planners.footprint import Footprint
-from planners.problem import Unknown
-from planners.registry import PLANNERS
 from planners.scenario.outcome import Bound
+from planners.scenario.queries import (
+    QuerySettings,
+    bound_from,
+    check_query,
+    check_stated_once,
+)
 
 FILE = "scenario.toml"
-S = TypeVar("S", bound=Settings)
-
-
-Expected = Literal[
-    "route",
-    "OutsideMapError",
-    "NonFreeError",
-    "UnknownSpaceError",
-    "EnclosedError",
-    "TimeLimitError",
-    "UnsolvedError",
-]
-
-
-class QuerySettings(Settings):
-    """A route to be asked for, and what is expected of it."""
-
-    name: str = Field(description="what figures of it are called after")
-    start: tuple[float, ...] = Field(description="x, y [m, map] and optionally yaw [rad]")
-    goal: tuple[float, ...] = Field(description="x, y [m, map] and optionally yaw [rad]")
-    footprint: float | tuple[tuple[float, float], ...] = Field(
-        description="what to plan with: a radius [m], or the corners of an outline [m, base_link]"
-    )
-    robot_radius: float | None = Field(
-        None, ge=0, description="what must not touch the true world; the footprint unless told [m]"
-    )
-    expect: Expected = Field("route", description="'route', or the name of the error")
-    reason: str | None = Field(
-        None, description="pattern that the error's sentence holds, as Python's re takes it"
-    )
-    planner: str = Field("astar", description="name of the planner")
-    unknown: Unknown = Field("avoid", description="unknown and contested space")
-    time_limit: float | None = Field(
-        None, ge=0, description="search time [s]; the planner's own unless told"
-    )
-    settings: dict[str, Any] = Field(
-        default_factory=dict, description="of the planner, such as seed and iterations"
-    )
-    max_ratio: float | None = Field(
-        None, ge=1, description="of the route's length to that of the best in the true world"
-    )
-
-    @property
-    def radius(self) -> float:
-        """Radius of the disc that holds the footprint at every heading [m]."""
-        return Footprint.of(self.footprint).radius
-
-
-class BoundSettings(Settings):
-    """What a figure is held to."""
-
-    min: float | None = Field(None, description="it is at least this")
-    max: float | None = Field(None, description="it is at most this")
 
 
 class LogSettings(Settings):
@@ -105,7 +53,7 @@ class Scenario:
     mapper: MapperSettings
     ground: GroundSettings
     queries: tuple[QuerySettings, ...]
-    bounds: Mapping[str, Bound]
+    bounds: Mapping[str, Bound]  #: of ``[bounds]``; `queries.bounds_of` gives those of the queries
 
 
 def find_scenarios(places: Iterable[Path]) -> list[Path]:
@@ -132,7 +80,8 @@ def load_scenario(path: Path) -> Scenario:
     ------
     FileFormatError
         Not TOML; a table or a key that a scenario does not have (the nearest is named), one that
-        it lacks, or a value out of its range.
+        it lacks, or a value out of its range; a bound in ``[bounds]`` on a figure that a query
+        holds itself. Neither replaces the other: state each figure's bound in one place.
     """
     content = _read(path)
     try:
@@ -189,10 +138,13 @@ def _scenario(path: Path, content: dict[str, Any]) -> Scenario:
         hole.hole()
     queries = tuple(QuerySettings(**table) for table in head.queries)
     for query in queries:
-        _check(query)
+        check_query(query)
     names = [query.name for query in queries]
     if len(set(names)) < len(names):
         raise InputError("queries", "a name of its own for each", ", ".join(names))
+    bounds = {name: bound_from(name, table) for name, table in head.bounds.items()}
+    for query in queries:
+        check_stated_once(query, bounds, known_world=head.log is None)
     return Scenario(
         name=path.resolve().parent.name if path.name == FILE else path.stem,
         path=path,
@@ -209,30 +161,8 @@ def _scenario(path: Path, content: dict[str, Any]) -> Scenario:
         mapper=MapperSettings(**head.mapper),
         ground=GroundSettings(**head.ground),
         queries=queries,
-        bounds={name: _bound(name, table) for name, table in head.bounds.items()},
+        bounds=bounds,
     )
-
-
-def _check(query: QuerySettings) -> None:
-    """Refuse what would only show when the query is asked, or never."""
-    if query.planner not in PLANNERS:
-        known = ", ".join(sorted(PLANNERS))
-        raise InputError("queries.planner", f"one of {known}", repr(query.planner))
-    try:
-        PLANNERS[query.planner].settings(**query.settings)
-    except SettingsError as error:
-        raise InputError(f"queries.settings.{error.name}", error.expected, error.got) from error
-    try:
-        Footprint.of(query.footprint)
-    except ProblemError as error:
-        raise InputError(f"queries.{error.name}", error.expected, error.got) from error
-    if query.reason is not None and query.expect == "route":
-        raise InputError("queries.reason", "none where a route is expected", repr(query.reason))
-    try:
-        re.compile(query.reason or "")
-    except re.error as error:
-        expected = f"a regular expression ({error})"
-        raise InputError("queries.reason", expected, repr(query.reason)) from error
 
 
 def _tables(world: dict[str, Any], name: str) -> list[dict[str, Any]]:
@@ -250,13 +180,3 @@ def _generator(table: dict[str, Any], folder: Path) -> WorldGenerator:
     if isinstance(table.get("path"), str):  # from the scenario's file on
         table["path"] = str(folder / table["path"])
     return GENERATORS[kind](**table)
-
-
-def _bound(name: str, table: dict[str, Any]) -> Bound:
-    bound = BoundSettings(**table)
-    if bound.min is None and bound.max is None:
-        raise InputError(f"bounds.{name}", "min, max, or both", "neither")
-    if bound.min is not None and bound.max is not None and bound.min > bound.max:
-        got = f"{bound.min:g} and {bound.max:g}"
-        raise InputError(f"bounds.{name}", "min of at most max", got)
-    return Bound(min=bound.min, max=bound.max)

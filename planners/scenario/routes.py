@@ -13,12 +13,11 @@ from groundmap.simulate.truth import touched_cells
 from planners.errors import PlanningError
 from planners.problem import PlanningProblem
 from planners.registry import plan
-from planners.scenario.case import QuerySettings
-from planners.scenario.outcome import REASON, Bound, Figure
+from planners.scenario.outcome import REASON, Figure
+from planners.scenario.queries import OUTCOME, QuerySettings
 from planners.scenario.simulated import Simulated
 
 FINE = 0.05  # [m], cells of the true world's map
-OUTCOME = "route"  # what is expected where no error is
 # Of the best route.
 IN_TRUTH: dict[str, Any] = {
     "planner": "astar",
@@ -83,18 +82,6 @@ def held_to_truth(answer: Answer, simulated: Simulated, fine: ConfidenceGrid) ->
     if isinstance(optimum, float) and optimum > 0:
         figures["ratio"] = float(shapely.length(line)) / optimum
     return answer._replace(figures=figures)
-
-
-def bounds_of(query: QuerySettings, *, known_world: bool) -> dict[str, Bound]:
-    """Return what the figures of a query are held to."""
-    bounds = {"outcome": Bound(equals=query.expect)}
-    if query.reason is not None:
-        bounds[REASON] = Bound(matches=query.reason)
-    if query.expect == OUTCOME and known_world:
-        bounds["collisions"] = Bound(max=0)
-    if query.max_ratio is not None:
-        bounds["ratio"] = Bound(max=query.max_ratio)
-    return bounds
 
 
 def true_map(simulated: Simulated) -> ConfidenceGrid:

@@ -14,7 +14,8 @@ from groundmap.evaluate import evaluate
 from groundmap.simulate.measures import measure
 from planners.scenario.case import Scenario, load_scenario
 from planners.scenario.outcome import Bound, Figure, Outcome
-from planners.scenario.routes import Answer, ask, bounds_of, held_to_truth, true_map
+from planners.scenario.queries import bounds_of
+from planners.scenario.routes import Answer, ask, held_to_truth, true_map
 from planners.scenario.simulated import Simulated, simulate
 
 DPI = 100  # of the pictures in the report

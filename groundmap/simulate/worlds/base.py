@@ -29,14 +29,6 @@ class WorldGenerator(Settings, ABC):
     ground_texture: float = Field(6.0, ge=0, description="point features on the ground [1/m²]")
     ground_lines: float = Field(0.0, ge=0, description="segment features on the ground [1/m²]")
 
-    def __init__(self, **values: Any) -> None:
-        super().__init__(**values)
-        self.check()
-
-    def check(self) -> None:
-        """Raise `SettingsError` if the sizes do not fit one another; by default they do."""
-        return
-
     @abstractmethod
     def make(self, rng: np.random.Generator) -> World:
         """Return a world; the same state of the generator gives the same one."""

@@ -47,8 +47,7 @@ class Forest(BuiltWorld):
         least = 2 * (self.spacing + self.max_radius)
         if min(xmax - xmin, ymax - ymin) < least:
             raise SettingsError("bounds", f"sides of {least:g} or more [m]", str(self.bounds))
-        if self.min_radius > self.max_radius:
-            raise SettingsError("min_radius", "at most the max_radius", f"{self.min_radius:g}")
+        self.check_order("min_radius", "max_radius")
 
     def make(self, rng: np.random.Generator) -> World:
         """Return the trees, drawn one after the other where there is still room."""
