@@ -45,7 +45,7 @@ def likely_mistakes(views: Sequence[View]) -> list[str]:
     views : sequence of View
         The first views of a log; `SAMPLE` are enough.
     """
-    found = [*_in_features(views), *_in_poses(views)]
+    found = [*_in_features(views), *_in_poses(views)] if views else []
     return [f"Likely cause: {sentence}" for sentence in found]
 
 
@@ -104,15 +104,12 @@ def _in_features(views: Sequence[View]) -> list[str]:
         ]
     if dropped["behind_camera"] > total / 2:
         return [
-            f"z is not above 0 in {dropped['behind_camera']:,} of {total:,} features. Their XYZ may "
+            f"z is not above 0 in {dropped['behind_camera']:,} of {total:,} features. XYZ may "
             "be in other axes: expected x right, y down, z forward from the left camera."
         ]
-    xyz = np.concatenate([part.reshape(-1, 3) for view in views for part in _positions(view)])
+    both = [part.xyz for view in views for part in (view.points, view.segments)]
+    xyz = np.concatenate([part.reshape(-1, 3) for part in both])
     return _in_positions(xyz, views[0].rig) if len(xyz) >= FEWEST else []
-
-
-def _positions(view: View) -> tuple[Floats, Floats]:
-    return view.points.xyz, view.segments.xyz
 
 
 def _in_positions(xyz: Floats, rig: StereoRig) -> list[str]:
@@ -124,10 +121,11 @@ def _in_positions(xyz: Floats, rig: StereoRig) -> list[str]:
             f"the features' image coordinates span {np.ptp(u):.2g} by {np.ptp(v):.2g} px. They may "
             "be normalised: expected pixels."
         ]
-    if np.median(np.hypot(x, y)) > WIDEST_MEDIAN:
+    off_axis = float(np.median(np.hypot(x, y)))
+    if off_axis > WIDEST_MEDIAN:
         return [
-            f"half of the features are seen more than {_degrees_off(x, y):.0f} degrees off the "
-            f"optical axis with fx = {rig.fx:g}, cx = {rig.cx:g}. The focal length may be in "
+            f"half of the features are {np.degrees(np.arctan(off_axis)):.0f} degrees or more off "
+            f"the optical axis with fx = {rig.fx:g}, cx = {rig.cx:g}. The focal length may be in "
             "millimetres: expected pixels."
         ]
     if depth > FARTHEST_MEDIAN:
@@ -139,10 +137,6 @@ def _in_positions(xyz: Floats, rig: StereoRig) -> list[str]:
             f"{2 * rig.cx:g}. cx and cy may be swapped."
         ]
     return []
-
-
-def _degrees_off(x: Floats, y: Floats) -> float:
-    return float(np.degrees(np.arctan(np.median(np.hypot(x, y)))))
 
 
 def _unit_advice(rig: StereoRig) -> str:

@@ -76,6 +76,52 @@ def test_map_prints_what_it_did(mapped: Ran, log: Path) -> None:
     assert len(grid.trajectory) == VIEWS
 
 
+@pytest.fixture
+def swapped(tmp_path: Path) -> Path:
+    """A log with uL and uR in the wrong columns."""
+    folder = tmp_path / "swapped"
+    folder.mkdir()
+    (folder / "rig.toml").write_text(
+        'world = "optical"\nfx = 700\nfy = 700\ncx = 620\ncy = 190\nbaseline = 0.54\n'
+    )
+    (folder / "poses.txt").write_text("".join(f"{n} 0 0 {n} 0 0 0 1\n" for n in range(6)))
+    rows = [f"{view},{row},{300 + row},{330 + row},250" for view in range(6) for row in range(50)]
+    (folder / "points.csv").write_text("\n".join(["view,id,uL,uR,v", *rows]) + "\n")
+    return folder
+
+
+def test_map_names_the_likely_cause_where_there_is_no_ground(swapped: Path) -> None:
+    ran = run("map", swapped, "--out", swapped / "map.npz", "--json")
+    assert ran.code == 2
+    assert "(dropped: 300 no_disparity)" in ran.err
+    assert "uL and uR may be swapped" in ran.err
+    assert "--camera-height" not in ran.err
+
+
+def test_map_warns_of_a_map_without_a_free_cell_and_names_the_likely_cause(swapped: Path) -> None:
+    ran = run("map", swapped, "--out", swapped / "map.npz", "--camera-height", "1.5", "--json")
+    assert ran.code == 0
+    assert ran.json["area_free_m2"] == 0
+    empty, cause = ran.json["warnings"]
+    assert empty == (
+        "the map has no free cell: 0 of 300 features of 6 views were used "
+        "(dropped: 300 no_disparity)."
+    )
+    assert "uL and uR may be swapped" in cause
+    assert ran.err.splitlines()[-2:] == [f"warning: {empty}", f"warning: {cause}"]
+
+
+def test_map_of_a_sound_log_has_no_warnings(mapped: Ran) -> None:
+    assert mapped.json["warnings"] == []
+    assert "warning" not in mapped.err
+
+
+def test_evaluate_takes_the_cameras_height(log: Path) -> None:
+    ran = run("evaluate", log, "--camera-height", "-1", "--json")
+    assert ran.code == 2
+    assert "camera_height: expected a number above 0 [m]" in ran.err
+
+
 def test_the_stages_of_map_add_up_to_the_wall_time(mapped: Ran) -> None:
     stages = mapped.json["stages_s"]
     assert min(stages.values()) >= 0

@@ -10,7 +10,7 @@ import pytest
 
 from groundmap import ConfidenceGrid, Features, StereoRig, View, read_views
 from groundmap.arrays import Floats
-from groundmap.errors import InputError
+from groundmap.errors import InputError, NoGroundPlaneError
 from groundmap.evaluate import FOLDS, PROTOCOLS, Verdict, evaluate
 from groundmap.judge import HeldOut, judge
 
@@ -123,6 +123,25 @@ def test_a_short_log_is_refused() -> None:
 def test_landmarks_without_ids_are_refused() -> None:
     with pytest.raises(InputError, match=r"landmark id for every point, .* at view 0"):
         evaluate(few_views(6))
+
+
+def test_maps_and_judge_take_the_cameras_height_where_no_plane_can_be_fitted() -> None:
+    bare = [
+        replace(
+            view,
+            T_map_base=view.T_map_camera,
+            rig=replace(view.rig, T_base_camera=np.eye(4)),
+            points=replace(view.points.select(np.arange(8)), ids=np.arange(8)),
+        )
+        for view in few_views(5)
+    ]
+    with pytest.raises(NoGroundPlaneError, match="--camera-height"):
+        evaluate(bare, ground={"window": 1})
+    figures = evaluate(bare, camera_height=1.0)["views"].figures
+    assert (figures.grounds, figures.obstacles) == (40, 0)
+    assert figures.ground_free > 0.5
+    # With a camera that is taken to be higher, the same features are obstacles.
+    assert evaluate(bare, camera_height=2.0)["views"].figures.obstacles == 40
 
 
 def view_with(points: Features) -> View:

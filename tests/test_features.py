@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from groundmap import Features, GroundPlane, StereoRig, View
 from groundmap.arrays import Floats
 from groundmap.errors import CameraError, InputError
+from groundmap.features import sigma_along, wrong_covariance
 
 RIG = StereoRig(fx=700.0, fy=700.0, cx=320.0, cy=240.0, baseline=0.5)
 
@@ -106,7 +107,7 @@ def test_features_without_ids_have_minus_one() -> None:
 @given(st.lists(st.integers(0, 5), max_size=8))
 def test_select_takes_rows_by_index_from_all_columns_alike(rows: list[int]) -> None:
     xyz = np.arange(18.0).reshape(6, 3)
-    covariance = np.arange(54.0).reshape(6, 3, 3)
+    covariance = np.arange(6.0)[:, None, None] * 9.0 * np.eye(3)
     features = Features.points(xyz, covariance, np.arange(6) * 10)
     picked = features.select(np.array(rows, dtype=np.int64))
     assert len(picked) == len(rows)
@@ -203,3 +204,48 @@ def test_with_plane_gives_another_view_and_leaves_this_one() -> None:
     assert standing.dropped == view.dropped == {"behind_camera": 1}
     npt.assert_array_equal(standing.points.xyz, view.points.xyz)
     assert standing.timestamp == 3.0
+
+
+@pytest.mark.parametrize(
+    ("matrix", "message"),
+    [
+        (np.diag([1.0, 1.0, -0.25]), r"semi-definite matrix, got the eigenvalue -0\.25"),
+        ([[1.0, 2.0, 0], [2.0, 1.0, 0], [0, 0, 1.0]], r"got the eigenvalue -1 at index 3"),
+        ([[1.0, 0.5, 0], [0, 1.0, 0], [0, 0, 1.0]], r"symmetric matrix, .* differ by 0\.5"),
+    ],
+)
+@pytest.mark.parametrize("scale", [1e-12, 1.0, 1e12])
+def test_the_first_covariance_that_is_none_is_refused(
+    matrix: Floats, message: str, scale: float
+) -> None:
+    given = spread(6)
+    given[3] = np.asarray(matrix)
+    given[5] = -np.eye(3)
+    if scale != 1.0:
+        message = "at index 3"
+    with pytest.raises(InputError, match=rf"^covariance: expected a .*{message}"):
+        Features.points(np.ones((6, 3)), given * scale)
+    ends = np.stack([spread(6), given], axis=1)
+    with pytest.raises(InputError, match=rf"^covariance: expected a .*{message}"):
+        Features.segments(np.ones((6, 2, 3)), ends * scale)
+
+
+def test_covariances_that_are_singular_rounded_or_not_finite_are_taken() -> None:
+    direction = np.array([0.6, 0.0, 0.8])
+    given = np.stack([np.zeros((3, 3)), np.outer(direction, direction), np.full((3, 3), np.nan)])
+    given[1] = np.round(given[1] * 1.23456789, 6)
+    assert len(Features.points(np.ones((3, 3)), given)) == 3
+
+
+@given(st.floats(0.5, 5000.0), st.floats(-600.0, 600.0), st.floats(0.05, 300.0))
+def test_covariances_of_triangulated_pixels_are_positive_semi_definite(
+    fx: float, u: float, disparity: float
+) -> None:
+    rig = StereoRig(fx=fx, fy=fx, cx=0.0, cy=0.0, baseline=0.1)
+    assert wrong_covariance(rig.triangulate([(u, u - disparity, 0.3 * u)]).covariance) is None
+
+
+def test_a_direction_known_exactly_has_no_negative_variance() -> None:
+    direction = np.array([0.6, 0.0, 0.8])
+    rounded = np.round(np.outer(direction, direction), 3) - 1e-6 * np.eye(3)
+    assert sigma_along(np.array([0.8, 0.0, -0.6]), rounded[None])[0] == 0.0

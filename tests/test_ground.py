@@ -108,13 +108,17 @@ def test_a_camera_within_60_degrees_of_level_is_accepted(pitch: float, yaw: floa
 
 @given(st.floats(60.5, 90.0), st.floats(-180, 180))
 def test_a_mounted_camera_that_looks_at_the_ground_is_refused(pitch: float, yaw: float) -> None:
-    with pytest.raises(NoGroundPlaneError, match=r"^the camera looks at the ground \(-[6-9]\d deg"):
+    with pytest.raises(
+        NoGroundPlaneError, match=r"^the view: the camera looks at the ground \(-[6-9]\d deg"
+    ):
         check_camera(View(T_map_base=turned("z", yaw), rig=mounted(pitch=pitch)))
 
 
 @given(st.floats(60.5, 90.0), st.floats(-180, 180))
 def test_a_mounted_camera_that_looks_at_the_sky_is_refused(pitch: float, yaw: float) -> None:
-    with pytest.raises(NoGroundPlaneError, match=r"^the camera looks at the sky \(\+[6-9]\d deg"):
+    with pytest.raises(
+        NoGroundPlaneError, match=r"^the view: the camera looks at the sky \(\+[6-9]\d deg"
+    ):
         check_camera(View(T_map_base=turned("z", yaw), rig=mounted(pitch=-pitch)))
 
 
@@ -126,7 +130,7 @@ def test_a_bare_camera_may_lean_up_to_45_degrees(angle: float, axis: str) -> Non
 @given(st.floats(45.5, 180.0), st.sampled_from([-1.0, 1.0]))
 def test_a_camera_on_its_side_or_upside_down_is_refused(angle: float, side: float) -> None:
     with pytest.raises(
-        NoGroundPlaneError, match=r"^up of the base is \d+ degrees off z of the map"
+        NoGroundPlaneError, match=r"^the view: up of the base is \d+ degrees off z of the map"
     ):
         check_camera(bare_view(turned("x", side * angle)))
 

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from groundmap import Features, GroundPlane, StereoRig, View, fit_ground
+from groundmap import Features, GroundMapper, GroundPlane, StereoRig, View, fit_ground
 from groundmap.arrays import Floats
 from groundmap.errors import InputError, NoGroundPlaneError, SettingsError
 from groundmap.frames import T_REP103_OPTICAL, invert
@@ -270,7 +270,9 @@ def test_walls_alone_are_no_ground() -> None:
     )
     features = Features.points(xyz, np.broadcast_to(1e-4 * np.eye(3), (200, 3, 3)))
     view = View(T_map_base=T_REP103_OPTICAL, rig=RIG, points=features)
-    with pytest.raises(NoGroundPlaneError, match="no plane below the camera holds enough"):
+    with pytest.raises(
+        NoGroundPlaneError, match=r"no plane between 0\.1 and 5 m below the camera holds enough"
+    ):
         list(fit_ground([view]))
 
 
@@ -390,3 +392,74 @@ def test_views_before_a_refused_one_come_out_of_a_causal_window() -> None:
     assert len(list(islice(fitted, 3))) == 3
     with pytest.raises(NoGroundPlaneError, match="looks at the sky"):
         next(iter(fitted))
+
+
+def slope_ahead(angle: float, height: float, start: float, seed: int) -> list[View]:
+    """Return views of a level road that goes down (or up) a ramp, 10 m after its origin."""
+    rng = np.random.default_rng(seed)
+    x, y = rng.uniform(0.0, 60.0, 1500), rng.uniform(-5.0, 5.0, 1500)
+    road = np.column_stack([x, y, np.maximum(x - 10.0, 0.0) * np.tan(np.radians(angle))])
+    views = []
+    for number in range(6):
+        pose = pose_at(start + 0.7 * number)
+        pose[2, 3] = height
+        camera = pose @ T_REP103_OPTICAL
+        seen = road @ invert(camera)[:3, :3].T + invert(camera)[:3, 3]
+        seen = seen[(seen[:, 2] > 1.0) & (seen[:, 2] < 25.0)]
+        views.append(View(T_map_base=camera, rig=RIG, points=look(rng, seen)))
+    return views
+
+
+@given(
+    st.floats(-14, 14), st.floats(0.3, 1.6), st.sampled_from([0.0, 3.0]), st.integers(0, 2**32 - 1)
+)
+@settings(max_examples=40)
+def test_no_fitted_plane_is_nearer_or_farther_below_the_camera_than_the_settings_say(
+    angle: float, height: float, start: float, seed: int
+) -> None:
+    views = slope_ahead(angle, height, start, seed)
+    try:
+        fitted = list(fit_ground(views, lowest_camera=0.25, highest_camera=2.5))
+    except NoGroundPlaneError as error:
+        assert "no plane between 0.25 and 2.5 m below the camera" in str(error)  # noqa: PT017
+        return
+    for view in fitted:
+        assert 0.25 <= plane_of(view).height(RIG.T_base_camera[:3, 3]) <= 2.5
+
+
+@pytest.mark.parametrize("angle", [-12.0, -11.0, -10.0, -8.0])
+@pytest.mark.parametrize("height", [0.3, 0.6])
+def test_a_ramp_down_ahead_is_mapped_or_refused_by_name(angle: float, height: float) -> None:
+    mapper = GroundMapper()
+    try:
+        for view in fit_ground(slope_ahead(angle, height, 0.0, 0)):
+            mapper.integrate(view)
+    except NoGroundPlaneError as error:
+        assert "give the camera's height" in str(error)  # noqa: PT017
+
+
+PLANE_ABOVE = r"got one 0\.5 m above it\. GroundPlane's offset .* --camera-height"
+
+
+def test_a_given_plane_above_the_camera_is_refused_with_the_view_and_the_height() -> None:
+    plane = GroundPlane(normal=np.array([0.0, -1.0, 0.0]), offset=-0.5)
+    views = drive(n_views=2)
+    with pytest.raises(NoGroundPlaneError, match=rf"^view 0 \(timestamp 0 s\): .*{PLANE_ABOVE}"):
+        list(fit_ground(views, plane=plane))
+    mapper = GroundMapper()
+    mapper.integrate(views[0].with_plane(replace(plane, offset=1.6)))
+    with pytest.raises(NoGroundPlaneError, match=rf"^view 1 \(timestamp 1 s\): .*{PLANE_ABOVE}"):
+        mapper.integrate(views[1].with_plane(plane))
+
+
+def test_a_base_that_is_above_its_camera_does_not_tell_where_the_ground_is() -> None:
+    mounting = np.eye(4)
+    mounting[2, 3] = -0.5
+    rig = replace(RIG, T_base_camera=mounting @ T_REP103_OPTICAL)
+    with pytest.raises(NoGroundPlaneError, match=rf"^view 0: .*{PLANE_ABOVE}"):
+        list(fit_ground([View(T_map_base=pose_at(0.0), rig=rig)]))
+
+
+def test_limits_of_the_cameras_height_in_the_wrong_order_are_refused() -> None:
+    with pytest.raises(SettingsError, match=r"^lowest_camera: expected at most highest_camera, 1"):
+        list(fit_ground([], lowest_camera=2.0, highest_camera=1.0))

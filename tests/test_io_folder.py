@@ -194,6 +194,11 @@ def test_a_bad_rig_is_refused(folder: Path, change: Callable[[str], str], messag
         ("# timestamp tx ty tz\n\n", "at least one pose, got an empty file"),
         ("1 0 0 0 0 0 0 1\n2 0 0 0 0", "8 columns, got 5 at line 2. .* cut short"),
         ("1 0 0 0 0 0 0 1\n\n2 x 0 0 0 0 0 1", "8 numbers, got '2 x 0 0 0 0 0 1' at line 3"),
+        ("1,0,0,0,0,0,0,1\n", "8 columns, got 1 at line 1. .* white space .*, not by commas."),
+        ("1, 0, 0, 0, 0, 0, 0, 1\n", "8 numbers, .* white space in this file, not by commas."),
+        ("1;0;0;0;0;0;0;1\n", "8 columns, got 1 at line 1. .* not by semicolons."),
+        ("1 0,5 0 0 0 0 0 1\n", "8 numbers, .* Numbers have a decimal point, not a comma."),
+        (f"{'1 ' * 12}\n", "8 columns, timestamp tx .*, got 12. .* KITTI's 3 x 4 matrices"),
         ("1 0 0 0 1 0 0 1\n", "length 1 .*, got length 1.414 at line 1"),
         ("1 0 0 0 0 0 0 0\n", "length 1 .*, got length 0 at line 1"),
         ("1 0 0 0 nan 0 0 1\n", "length 1 .*, got length nan at line 1"),
@@ -215,6 +220,16 @@ def test_a_bad_pose_is_refused_by_line(folder: Path, text: str, message: str) ->
         ("segments.csv", POINTS, "the columns view,id,uL0,.* got 'view,id,uL,uR,v'"),
         ("points.csv", f"{POINTS}2,7,320.0,28", "5 columns, got 4 at line 5. .* cut short"),
         ("points.csv", f"{POINTS}\n2,7,1,2,3,4", "5 columns, got 6 at line 6"),
+        (
+            "points.csv",
+            f"{POINTS}2 7 320 280 1",
+            "5 columns, got 1 at line 5. .* not by white space",
+        ),
+        (
+            "points.csv",
+            f"{XYZ_POINTS}\n1,-1,1,2,3,1,0,0,1,0,-0.5\n",
+            "a covariance that is a positive semi-definite matrix, got the eigenvalue -0.5 at line",
+        ),
         ("points.csv", f"{POINTS}2,7,320.0,,240", "numbers, .* got '2,7,320.0,,240' at line 5"),
         ("points.csv", f"{POINTS}2,7.5,320.0,285.0,240", "first 2 integers, got .* at line 5"),
         (

@@ -197,7 +197,7 @@ def on_its_side(view: View) -> View:
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (without_plane, "^view 0 has no ground plane: expected views from groundmap.fit_ground"),
+        (without_plane, "^view 3 has no ground plane: expected views from groundmap.fit_ground"),
         (at_the_sky, "looks at the sky"),
         (on_its_side, "degrees off z of the map"),
     ],

@@ -15,8 +15,9 @@ from groundmap.simulate.parts import HoleSettings, SolidSettings
 from groundmap.simulate.scan import ScanSettings
 from groundmap.simulate.sensor import SensorSettings
 from groundmap.simulate.worlds import Corridor, Empty, MapImage
-from planners.scenario.case import FILE, QuerySettings, find_scenarios, load_scenario
+from planners.scenario.case import FILE, find_scenarios, load_scenario
 from planners.scenario.outcome import Bound
+from planners.scenario.queries import QuerySettings
 from planners.scenario.simulated import build_world
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
@@ -26,6 +27,7 @@ WHY = 'why = "A hall."\n'
 WORLD = "[world]\nbounds = [0, 0, 6, 4]\n"
 DRIVE = "[drive]\nstops = [[1, 1, 0]]\n"
 SMALLEST = WHY + WORLD + DRIVE
+ASKED = "[[queries]]\nname = 'a'\nstart = [1, 1]\ngoal = [5, 1]\nfootprint = 0.3\n"
 FULL = """
 why = '''
 One reason,
@@ -320,10 +322,29 @@ def test_a_solid_or_a_hole_that_is_none_is_refused_before_anything_runs(
             "[bounds]\nunknown = { min = 2, max = 1 }",
             r"bounds\.unknown to be min of at most max, got 2 and 1",
         ),
+        (
+            f"{ASKED}max_ratio = 1.1\n[bounds]\n'a.ratio' = {{ max = 1.5 }}",
+            r"bounds\.a\.ratio to be no bound, .* ≤ 1\.1 itself, got ≤ 1\.5\. .*max_ratio.*",
+        ),
+        (
+            f"{ASKED}[bounds]\n'a.collisions' = {{ max = 2 }}",
+            r"bounds\.a\.collisions to be no bound, .* ≤ 0 itself, got ≤ 2\. .*robot_radius.*",
+        ),
+        (
+            f"{ASKED}expect = 'EnclosedError'\n[bounds]\n'a.outcome' = {{ max = 0 }}",
+            r"bounds\.a\.outcome to be no bound, .* = EnclosedError itself.*'expect' of the query",
+        ),
     ],
 )
 def test_a_value_out_of_its_range_is_refused(tmp_path: Path, table: str, sentence: str) -> None:
     assert_refused(tmp_path, SMALLEST + table + "\n", rf"expected {sentence}\.")
+
+
+@pytest.mark.parametrize("name", ["a.ratio", "a.length", "b.collisions"])
+def test_a_figure_that_no_query_holds_may_be_bounded(tmp_path: Path, name: str) -> None:
+    path = tmp_path / FILE
+    path.write_text(SMALLEST + ASKED + f"[bounds]\n'{name}' = {{ max = 1.5 }}\n")
+    assert load_scenario(path).bounds == {name: Bound(max=1.5)}
 
 
 def test_the_path_of_a_map_is_text(tmp_path: Path) -> None:

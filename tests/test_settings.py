@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from groundmap.errors import SettingsError
 from groundmap.settings import GroundSettings, MapperSettings, Settings
+from groundmap.simulate import SensorSettings
 
 BOTH: list[type[Settings]] = [MapperSettings, GroundSettings]
 NUMBERS = [
@@ -95,3 +96,21 @@ def test_settings_are_frozen() -> None:
 def test_settings_are_given_by_name() -> None:
     with pytest.raises(TypeError, match="positional"):
         MapperSettings(0.1)  # type: ignore[call-arg]  # mypy sees it, too
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"min_range": 5.0, "max_range": 4.0}, "min_range: expected at most max_range, 4, got 5"),
+        ({"max_range": 0.2}, "min_range: expected at most max_range, 0.2, got 0.3"),
+        ({"step_height": 3.0}, "step_height: expected at most robot_height, 2, got 3"),
+    ],
+)
+def test_settings_in_the_wrong_order_are_refused(values: dict[str, float], message: str) -> None:
+    with pytest.raises(SettingsError, match=f"^{message}"):
+        build(MapperSettings, **values)
+
+
+def test_disparities_of_false_matches_in_the_wrong_order_are_refused() -> None:
+    with pytest.raises(SettingsError, match=r"^false_disparity_px: .* ascending .*, got 120, 5"):
+        SensorSettings(false_disparity_px=(120, 5))

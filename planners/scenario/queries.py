@@ -128,6 +128,7 @@ def check_stated_once(
 
 
 def bound_from(name: str, table: dict[str, Any]) -> Bound:
+    """Return the bound of a table under ``[bounds]``."""
     bound = BoundSettings(**table)
     if bound.min is None and bound.max is None:
         raise InputError(f"bounds.{name}", "min, max, or both", "neither")
