@@ -7,14 +7,16 @@ from typing import Annotated, Any
 
 import typer
 
-from groundmap import CellState, GroundMapper, fit_ground, read_views
+from groundmap import CellState, GroundMapper, fit_ground, pose_jumps, read_views
 from groundmap.archive import check_writable
+from groundmap.arrays import Floats
 from groundmap.errors import InputError
 from groundmap.mapper import warm_up
 from groundmap.stages import Stages
 from planners.commands.settings_file import ConfigOption, read_settings
-from planners.console import JsonOption, emit, seconds_since_start, watched
+from planners.console import JsonOption, emit, say, seconds_since_start, watched
 
+SHOWN_JUMPS = 5  # of the poses, one line each
 NOT_MAPPING = {"startup", "read", "compile", "save", "other"}
 
 
@@ -67,14 +69,36 @@ def map_command(
     if total == 0:
         raise InputError(str(source), "at least one view", "none")
     views = fit_ground(stages.each("read", log), camera_height=camera_height, **tables["ground"])
+    positions: list[Floats] = []
+    times: list[float | None] = []
     for view in watched(stages.each("ground", views), total=total, what="mapping views"):
         mapper.integrate(view)
+        positions.append(view.T_map_base[:3, 3])
+        times.append(view.timestamp)
+    jumps = _jumps(positions, times)
     with stages.timed("save"):
         mapper.grid.save(out)
-    emit(_summary(mapper, stages, out), as_json=as_json, title=f"map of {source}")
+    emit(_summary(mapper, jumps, stages, out), as_json=as_json, title=f"map of {source}")
 
 
-def _summary(mapper: GroundMapper, stages: Stages, out: Path) -> dict[str, Any]:
+def _jumps(positions: list[Floats], times: list[float | None]) -> list[dict[str, float]]:
+    """Return the jumps of the poses for the summary, and warn of them on stderr."""
+    known = [time for time in times if time is not None]
+    jumps = pose_jumps(positions, known if len(known) == len(times) else None)
+    for jump in jumps[:SHOWN_JUMPS]:
+        say(
+            f"warning: the pose of view {jump.view} is {jump.step:.4g} m from that of view "
+            f"{jump.view - 1}, where steps are {jump.typical_step:.2g} m: is one of them wrong? "
+            "What is seen from a wrong pose lies at a wrong place in the map."
+        )
+    if len(jumps) > SHOWN_JUMPS:
+        say(f"warning: {len(jumps) - SHOWN_JUMPS} more poses jump; --json lists them")
+    return [jump._asdict() for jump in jumps]
+
+
+def _summary(
+    mapper: GroundMapper, jumps: list[dict[str, float]], stages: Stages, out: Path
+) -> dict[str, Any]:
     grid, stats = mapper.grid, mapper.stats
     area = {state: grid.area(state) for state in (CellState.FREE, CellState.NONFREE)}
     seconds = stages.stop()
@@ -86,6 +110,7 @@ def _summary(mapper: GroundMapper, stages: Stages, out: Path) -> dict[str, Any]:
         "features_dropped": dict(stats.features_dropped),
         "seen_through": stats.seen_through,
         "through_viewpoint": stats.through_viewpoint,
+        "pose_jumps": jumps,
         "area_free_m2": area[CellState.FREE],
         "area_nonfree_m2": area[CellState.NONFREE],
         "resolution": grid.resolution,
