@@ -7,6 +7,7 @@ from groundmap.grid import ConfidenceGrid
 from groundmap.ground import GroundPlane
 from groundmap.ground_fit import fit_ground
 from groundmap.io import load_map, read_views, write_views
+from groundmap.jumps import pose_jumps
 from groundmap.mapper import GroundMapper
 from groundmap.settings import GroundSettings, MapperSettings
 from groundmap.window import CellState, GridWindow
@@ -25,6 +26,7 @@ __all__ = [
     "View",
     "fit_ground",
     "load_map",
+    "pose_jumps",
     "read_views",
     "write_views",
 ]

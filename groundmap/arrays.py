@@ -19,6 +19,9 @@ Counts: TypeAlias = npt.NDArray[np.uint32]
 Bytes: TypeAlias = npt.NDArray[np.uint8]
 Bools: TypeAlias = npt.NDArray[np.bool_]
 
+FARTHEST_CELL = 2**60  # sums and differences of such cells stay within int64
+REAL_KINDS = "biufOSU"  # of dtypes: complex numbers, dates and records are no real numbers
+
 
 def as_floats(name: str, values: npt.ArrayLike, shape: tuple[int | None, ...]) -> Floats:
     """Return `values` as float64 of the given shape, ``None`` being any length.
@@ -37,10 +40,7 @@ def as_floats(name: str, values: npt.ArrayLike, shape: tuple[int | None, ...]) -
         ...
     groundmap.errors.InputError: points: expected shape (n, 2), got shape (2,).
     """
-    try:
-        array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(name, f"numbers of shape {_shown(shape)}", repr(values)[:60]) from error
+    array = _numbers(name, values, f"numbers of shape {_shown(shape)}")
     if array.size == 0 and None in shape and array.ndim != len(shape):
         array = array.reshape([0 if length is None else length for length in shape])
     fits = array.ndim == len(shape) and all(
@@ -49,6 +49,61 @@ def as_floats(name: str, values: npt.ArrayLike, shape: tuple[int | None, ...]) -
     if not fits:
         raise InputError(name, f"shape {_shown(shape)}", f"shape {array.shape}")
     return array
+
+
+def as_positions(name: str, values: npt.ArrayLike, length: int) -> Floats:
+    """Return one position or several as float64 of shape (n, length).
+
+    Raises
+    ------
+    InputError
+        Not numbers, of another shape, NaN or infinite.
+
+    Examples
+    --------
+    >>> as_positions("xy", (1, 2), 2)
+    array([[1., 2.]])
+    """
+    array = _numbers(name, values, f"numbers of shape {_shown((None, length))}")
+    positions = as_floats(name, np.atleast_2d(array), (None, length))
+    check_finite(name, positions)
+    return positions
+
+
+def as_cells(name: str, values: npt.ArrayLike, ndim: int) -> Ints:
+    """Return one cell or several as int64 of shape (n, ndim).
+
+    Raises
+    ------
+    InputError
+        Not whole numbers, of another shape, or farther than `FARTHEST_CELL` from cell 0.
+
+    Examples
+    --------
+    >>> as_cells("cells", [0, 2], 2)
+    array([[0, 2]])
+    """
+    expected = f"whole numbers of shape {_shown((None, ndim))}"
+    try:
+        given = np.asarray(values)
+    except ValueError as error:
+        raise InputError(name, expected, repr(values)[:60]) from error
+    if given.size and given.dtype.kind not in "iu":
+        raise InputError(name, expected, f"{given.dtype} of shape {given.shape}")
+    cells = np.atleast_2d(given) if given.size else given.reshape(-1, ndim)
+    if cells.ndim != 2 or cells.shape[1] != ndim:
+        raise InputError(name, expected, f"shape {given.shape}")
+    # Compared as they came: uint64 beyond the range would turn negative.
+    far = (cells > FARTHEST_CELL) | (cells < -FARTHEST_CELL)
+    if far.any():
+        row = int(np.argwhere(far)[0, 0])
+        raise InputError(
+            name,
+            f"cells within {FARTHEST_CELL} of cell 0",
+            str(cells[row].tolist()),
+            where=f"row {row}",
+        )
+    return cells.astype(np.int64)
 
 
 def is_number(value: object) -> TypeGuard[float]:
@@ -61,7 +116,10 @@ def is_number(value: object) -> TypeGuard[float]:
     """
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (Real, np.floating)):
         return False
-    return math.isfinite(float(value))
+    try:
+        return math.isfinite(float(value))
+    except OverflowError:  # a whole number beyond what a float holds
+        return False
 
 
 def check_finite(name: str, values: Floats, *, hint: str = "") -> None:
@@ -71,6 +129,20 @@ def check_finite(name: str, values: Floats, *, hint: str = "") -> None:
         index = tuple(int(i) for i in np.argwhere(wrong)[0])
         where = f"index {index if len(index) != 1 else index[0]}" if index else ""
         raise InputError(name, "finite numbers", str(values[index]), where=where, hint=hint)
+
+
+def _numbers(name: str, values: npt.ArrayLike, expected: str) -> Floats:
+    """Return `values` as float64; numbers beyond its range become infinite."""
+    try:
+        given = np.asarray(values)
+        if given.dtype.kind not in REAL_KINDS:
+            raise InputError(name, expected, f"{given.dtype} of shape {given.shape}")
+        with np.errstate(over="ignore"):
+            return np.asarray(given, dtype=np.float64)
+    except InputError:
+        raise
+    except (OverflowError, TypeError, ValueError) as error:
+        raise InputError(name, expected, repr(values)[:60]) from error
 
 
 def _shown(shape: tuple[int | None, ...]) -> str:

@@ -149,8 +149,8 @@ def _stamped(
         )
         z = np.zeros(window.count.shape, dtype=np.float32)
         for points, value in ((seen.grounds, -1.0), (seen.obstacles, 1.0)):
-            cells, distance = cells_around(window, points, STAMP_RADIUS, to_centre=True)
-            z[tuple(cells[distance <= STAMP_RADIUS].T)] = value
+            for cells, distance in cells_around(window, points, STAMP_RADIUS, to_centre=True):
+                z[tuple(cells[distance <= STAMP_RADIUS].T)] = value
         lower = np.rint((window.origin - grid.origin) / grid.resolution).astype(np.int64)[::-1]
         grid.fuse(lower, z)
     return grid

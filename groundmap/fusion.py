@@ -11,7 +11,7 @@ from groundmap.arrays import Counts, Floats32
 from groundmap.errors import InputError
 from groundmap.kernels.fuse import merge_average, update_average
 
-UNCAPPED = np.iinfo(np.uint32).max
+MOST_VIEWS = int(np.iinfo(np.uint32).max)  # counts stop there: one more would be 0, unknown
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Average:
 
     def update(self, confidence: Floats32, count: Counts, z: Floats32) -> None:
         """Add evidence `z` (0 says nothing) in place; C-contiguous arrays of one shape."""
-        update_average(confidence.reshape(-1), count.reshape(-1), z.reshape(-1), UNCAPPED)
+        update_average(confidence.reshape(-1), count.reshape(-1), z.reshape(-1), MOST_VIEWS)
 
     def merge(
         self, confidence: Floats32, count: Counts, other: Floats32, other_count: Counts
@@ -47,7 +47,7 @@ class Capped(Average):
     Parameters
     ----------
     cap : int, default 50
-        Largest update count.
+        Largest update count, 1 to 2**32 - 1.
     """
 
     name: ClassVar[str] = "capped"
@@ -56,8 +56,11 @@ class Capped(Average):
     cap: int = 50
 
     def __post_init__(self) -> None:
-        if not isinstance(self.cap, int) or self.cap < 1:
-            raise InputError("cap", "a count of 1 or more", str(self.cap))
+        whole = isinstance(self.cap, int) and not isinstance(self.cap, bool)
+        if not (whole and 1 <= self.cap <= MOST_VIEWS):
+            # Python refuses to write whole numbers of thousands of digits.
+            got = "a longer number" if whole and abs(self.cap) >= 2**64 else str(self.cap)[:60]
+            raise InputError("cap", f"a count of 1 to {MOST_VIEWS}", got)
 
     def update(self, confidence: Floats32, count: Counts, z: Floats32) -> None:
         """Add evidence `z` (0 says nothing) in place; C-contiguous arrays of one shape."""

@@ -10,14 +10,24 @@ import numpy as np
 import numpy.typing as npt
 
 from groundmap.archive import read_archive, write_archive
-from groundmap.arrays import Counts, Floats, Floats32, Ints, as_floats, check_finite
+from groundmap.arrays import (
+    Counts,
+    Floats,
+    Floats32,
+    Ints,
+    as_cells,
+    as_floats,
+    check_finite,
+    is_number,
+)
 from groundmap.errors import FileFormatError, InputError, MergeError
-from groundmap.fusion import Average, UpdateRule, rule_from
+from groundmap.extents import cells_of_box, check_size, check_whole
+from groundmap.fusion import MOST_VIEWS, Average, UpdateRule, rule_from
 from groundmap.tiles import LAYERS, TILE_SHAPES, Index, Tile, Tiles
 from groundmap.window import CellState, GridWindow, cells_of
 
 FORMAT, VERSION = "groundmap-grid", 1
-MOST_CELLS = 2**30  # of a dense window: 12 GiB
+MOST_CELLS = 2**28  # of a dense window: 3 GiB
 
 
 class ConfidenceGrid:
@@ -57,8 +67,8 @@ class ConfidenceGrid:
     ) -> None:
         if not isinstance(frame, str):
             raise InputError("frame", "a name", repr(frame))
-        if not (np.isfinite(resolution) and resolution > 0):
-            raise InputError("resolution", "a number above 0 [m]", str(resolution))
+        if not (is_number(resolution) and resolution > 0):
+            raise InputError("resolution", "a number above 0 [m]", repr(resolution)[:60])
         if len(origin) not in TILE_SHAPES:
             raise InputError("origin", "2 or 3 numbers [m]", f"{len(origin)}")
         self.resolution = float(resolution)
@@ -103,14 +113,7 @@ class ConfidenceGrid:
         return int(values[0]) if np.ndim(xy) == 1 else values
 
     def _at(self, xy: npt.ArrayLike, layer: str) -> npt.NDArray[Any]:
-        cells = cells_of(xy, self.origin, self.resolution)
-        values = np.zeros(len(cells), dtype=LAYERS[layer])
-        indices, inner = np.divmod(cells, self.tile_shape)
-        for position, index in enumerate(indices.tolist()):
-            tile = self._tiles.get(tuple(index))
-            if tile is not None:
-                values[position] = getattr(tile, layer)[tuple(inner[position])]
-        return values
+        return self._tiles.values_at(cells_of(xy, self.origin, self.resolution), layer)
 
     def cell_bounds(self) -> tuple[Ints, Ints]:
         """Return the first cell of the touched tiles and the cell past the last."""
@@ -122,7 +125,19 @@ class ConfidenceGrid:
         corners = np.concatenate([lower[::-1], upper[::-1]]).astype(np.float64)
         return np.tile(self.origin, 2) + corners * self.resolution
 
-    def window(self, bounds: npt.ArrayLike | None = None) -> GridWindow:
+    def check_extent(self, most_cells: int = MOST_CELLS) -> None:
+        """Check that the box around all touched tiles holds no more than `most_cells` cells.
+
+        Raises
+        ------
+        InputError
+            It holds more; tiles that lie far from the rest are named, and bounds without them.
+        """
+        check_whole(self._tiles, most_cells, self.origin, self.resolution)
+
+    def window(
+        self, bounds: npt.ArrayLike | None = None, *, most_cells: int = MOST_CELLS
+    ) -> GridWindow:
         """Return the cells of a box as dense arrays.
 
         Parameters
@@ -130,25 +145,22 @@ class ConfidenceGrid:
         bounds : array_like, shape (2 d,), optional
             Lower then upper corner [m, map], such as (xmin, ymin, xmax, ymax); every cell that
             the box touches is in. The box around all touched tiles unless told.
+        most_cells : int, default 2**28
+            Cells that the box may hold; each takes 12 bytes.
 
         Raises
         ------
         InputError
             Bounds that are not finite, whose upper corner is not above the lower, or that hold
-            more than 2**30 cells.
+            more than `most_cells` cells. Where far tiles make the box around all tiles that
+            large, they are named.
         """
         if bounds is None:
+            self.check_extent(most_cells)
             lower, upper = self.cell_bounds()
         else:
-            lower, upper = self._cells_of_box(bounds)
-        if np.prod((upper - lower).astype(np.float64)) > MOST_CELLS:
-            size = " x ".join(str(length) for length in (upper - lower).tolist())
-            raise InputError(
-                "bounds",
-                f"a box of {MOST_CELLS} cells at most",
-                size,
-                hint="Ask for a smaller box.",
-            )
+            lower, upper = cells_of_box(bounds, self.origin, self.resolution)
+            check_size(lower, upper, most_cells, self.resolution)
         dense = self._tiles.read(lower, upper)
         return GridWindow(
             dense.confidence,
@@ -157,15 +169,6 @@ class ConfidenceGrid:
             origin=self.origin + lower[::-1] * self.resolution,
             resolution=self.resolution,
         )
-
-    def _cells_of_box(self, bounds: npt.ArrayLike) -> tuple[Ints, Ints]:
-        box = as_floats("bounds", bounds, (2 * self.ndim,))
-        check_finite("bounds", box)
-        if not (box[: self.ndim] < box[self.ndim :]).all():
-            raise InputError("bounds", "an upper corner above the lower one", str(box.tolist()))
-        scaled = (box.reshape(2, self.ndim) - self.origin) / self.resolution
-        lower, upper = np.floor(scaled[0]), np.ceil(scaled[1])
-        return lower[::-1].astype(np.int64), upper[::-1].astype(np.int64)
 
     def area(self, state: CellState) -> float:
         """Return the area in that state [m²] (volume [m³] in 3-D)."""
@@ -191,8 +194,12 @@ class ConfidenceGrid:
         Raises
         ------
         InputError
-            Evidence that is NaN or beyond [-1, 1].
+            Evidence that is NaN or beyond [-1, 1], or a cell too far off to count.
         """
+        lower = as_cells("lower", lower, self.ndim)[0]
+        if np.ndim(z) != self.ndim or np.asarray(z).dtype.kind not in "biuf":
+            got = f"{np.asarray(z).dtype} of shape {np.shape(z)}"
+            raise InputError("z", f"evidence in {self.ndim} dimensions", got)
         if not (np.abs(z) <= 1.0).all():
             raise InputError("z", "evidence in [-1, 1]", "NaN or numbers beyond")
         for tile, block in self._tiles.cut(lower, z):
@@ -200,9 +207,10 @@ class ConfidenceGrid:
 
     def add_drop_offs(self, cells: Ints) -> None:
         """Count one more view that saw ground below the ground plane in these cells."""
-        for cell in np.unique(cells, axis=0):
+        for cell in np.unique(as_cells("cells", cells, self.ndim), axis=0):
             index, inner = divmod(cell, self.tile_shape)
-            self.tile(tuple(index.tolist())).drop_offs[tuple(inner)] += 1
+            drop_offs = self.tile(tuple(index.tolist())).drop_offs
+            drop_offs[tuple(inner)] += drop_offs[tuple(inner)] < MOST_VIEWS
 
     def merge(self, other: ConfidenceGrid) -> ConfidenceGrid:
         """Return a new grid that holds what both saw, as if one mapper had seen all views.
@@ -225,7 +233,7 @@ class ConfidenceGrid:
         for index, theirs in other.tiles():
             ours = merged.tile(index)
             self.rule.merge(ours.confidence, ours.count, theirs.confidence, theirs.count)
-            ours.drop_offs[...] += theirs.drop_offs
+            ours.drop_offs[...] += np.minimum(theirs.drop_offs, MOST_VIEWS - ours.drop_offs)
         merged.trajectory = np.concatenate([self.trajectory, other.trajectory])
         return merged
 

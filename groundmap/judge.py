@@ -22,6 +22,7 @@ JUDGED_RANGE = 15.0  # [m]
 GROUND_HEIGHT = 0.10  # [m], features within this of the plane are ground: less than a kerb
 OBSTACLE_HEIGHTS = (0.30, 1.80)  # [m], features between these are obstacles
 NEAR = 0.3  # [m], an obstacle this near to a non-free cell is on the map
+CELLS_AT_ONCE = 2**19  # around points; each takes some 100 bytes
 END_OF_SIGHT = 0.3  # [m], the last piece of a sight line is not judged
 
 
@@ -182,31 +183,34 @@ def _states_at(window: GridWindow, states: Bytes, points: Floats) -> Bytes:
 
 def cells_around(
     window: GridWindow, points: Floats, radius: float, *, to_centre: bool = False
-) -> tuple[Ints, Floats]:
-    """Return the cells in a box around each point, (n, k, 2), and how far each is, (n, k) [m].
+) -> Iterator[tuple[Ints, Floats]]:
+    """Yield the cells in a box around each point, (b, k, 2), and how far each is, (b, k) [m].
 
-    Distances are to the cells' squares, or to their centres.
+    In blocks of points, in their order, as small cells would fill the memory with the boxes of
+    all. Distances are to the cells' squares, or to their centres.
     """
     steps = int(np.ceil(radius / window.resolution)) + 1
     offsets = np.stack(np.meshgrid(*[np.arange(-steps, steps + 1)] * 2), axis=-1).reshape(-1, 2)
-    at = window.world_to_cell(points) if len(points) else np.empty((0, 2), dtype=np.int64)
-    cells = at[:, None, :] + offsets
-    centres = window.origin + (cells[..., ::-1] + 0.5) * window.resolution
-    apart = np.abs(points[:, None, :] - centres)
-    if not to_centre:
-        apart = np.maximum(apart - 0.5 * window.resolution, 0.0)
-    distance: Floats = np.hypot(apart[..., 0], apart[..., 1])
-    return cells, distance
+    block = max(1, CELLS_AT_ONCE // len(offsets))
+    for first in range(0, len(points), block):
+        part = points[first : first + block]
+        cells = window.world_to_cell(part)[:, None, :] + offsets
+        centres = window.origin + (cells[..., ::-1] + 0.5) * window.resolution
+        apart = np.abs(part[:, None, :] - centres)
+        if not to_centre:
+            apart = np.maximum(apart - 0.5 * window.resolution, 0.0)
+        yield cells, np.hypot(apart[..., 0], apart[..., 1])
 
 
 def near_nonfree(window: GridWindow, states: Bytes, points: Floats) -> Bools:
     """Return which points, shape (n, 2) [m, map], have a non-free cell within 0.3 m."""
-    cells, distance = cells_around(window, points, NEAR)
-    inside = window.contains(cells)
-    nonfree = np.zeros(inside.shape, dtype=np.bool_)
-    nonfree[inside] = states[tuple(cells[inside].T)] == CellState.NONFREE
-    near: Bools = np.logical_or.reduce(nonfree & (distance <= NEAR), axis=1)
-    return near
+    near = [np.empty(0, dtype=np.bool_)]
+    for cells, distance in cells_around(window, points, NEAR):
+        inside = window.contains(cells)
+        nonfree = np.zeros(inside.shape, dtype=np.bool_)
+        nonfree[inside] = states[tuple(cells[inside].T)] == CellState.NONFREE
+        near.append(np.logical_or.reduce(nonfree & (distance <= NEAR), axis=1))
+    return np.concatenate(near)
 
 
 def _along(window: GridWindow, points: Floats) -> Floats:

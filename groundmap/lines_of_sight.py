@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from groundmap.arrays import Bools, Floats
+from groundmap.arrays import Bools, Floats, Ints
 from groundmap.heights import FlatView
-from groundmap.kernels.lines import gap_chords, passed_through
+from groundmap.kernels.lines import features_beside, gap_chords, passed_through
 from groundmap.settings import MapperSettings
 from groundmap.surfaces import SurfaceKind, Surfaces
 from groundmap.uncertainty import MODELS
@@ -155,7 +155,8 @@ def missing_ground(flat: FlatView, step: float) -> Floats:
     range_at_end = np.hypot(flat.drop_offs[:, 0], flat.drop_offs[:, 1])
     entry = flat.camera_height / (flat.camera_height - flat.drop_off_heights)
     gap = range_at_end * (1.0 - entry)
-    rows = np.flatnonzero((gap <= DEEPEST_SIGHT) & ~_beside_ground(flat, entry * range_at_end))
+    rows = np.flatnonzero(gap <= DEEPEST_SIGHT)
+    rows = rows[~_beside_ground(flat, rows, (entry * range_at_end)[rows])]
     counts = np.ceil(gap[rows] / step).astype(np.int64)
     line = np.repeat(rows, counts)
     number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -164,12 +165,11 @@ def missing_ground(flat: FlatView, step: float) -> Floats:
     return places
 
 
-def _beside_ground(flat: FlatView, entry: Floats) -> Bools:
-    """Return which lines have a ground feature beside them beyond their entry, in metres."""
-    ray = flat.drop_offs / np.hypot(flat.drop_offs[:, 0], flat.drop_offs[:, 1])[:, None]
-    along = ray @ flat.supports.T
-    across = ray[:, :1] * flat.supports[:, 1] - ray[:, 1:] * flat.supports[:, 0]
-    end = (ray * flat.drop_offs).sum(axis=1)
-    between = (along > entry[:, None] + BESIDE) & (along < end[:, None] - BESIDE)
-    beside: Bools = np.logical_or.reduce(between & (np.abs(across) < BESIDE), axis=1)
+def _beside_ground(flat: FlatView, rows: Ints, entry: Floats) -> Bools:
+    """Return which of these drop-offs' lines have ground beside them beyond `entry` [m]."""
+    ends = flat.drop_offs[rows]
+    rays = ends / np.hypot(ends[:, 0], ends[:, 1])[:, None]
+    end = (rays * ends).sum(axis=1)
+    beside = np.empty(len(rows), dtype=np.bool_)
+    features_beside(rays, entry + BESIDE, end - BESIDE, flat.supports, BESIDE, beside)
     return beside

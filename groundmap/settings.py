@@ -73,7 +73,9 @@ class MapperSettings(Settings):
     mode: Literal["2d"] = Field("2d", description="ground plane (2d)")
     frame: str = Field("map", description="name of the frame the map is in")
     fusion: Literal["average", "capped"] = Field("average", description="how views add up")
-    cap: int = Field(50, ge=1, description="update count at which 'capped' starts to forget")
+    cap: int = Field(
+        50, ge=1, le=2**32 - 1, description="update count at which 'capped' starts to forget"
+    )
     uncertainty: Literal["ellipsoid", "radius", "none"] = Field(
         "ellipsoid", description="how a surface spreads over the cells it may be in"
     )

@@ -9,6 +9,7 @@ import numpy as np
 
 from groundmap.arrays import Bools, Bytes, Floats, Ints
 from groundmap.heights import FlatView
+from groundmap.kernels.crossings import blend_crossings
 from groundmap.settings import MapperSettings
 from groundmap.spans import inside_circle
 from groundmap.triangulation import Mesh
@@ -139,12 +140,7 @@ def _vertices(flat: FlatView, mesh: Mesh, settings: MapperSettings) -> _Vertices
     covariance = np.zeros((count, 2, 2))
     widest = np.argsort(np.trace(flat.covariance, axis1=1, axis2=2), kind="stable")
     covariance[mesh.source[widest]] = flat.covariance[widest]
-    for vertex, a, b in mesh.crossings.tolist():
-        length = np.hypot(*(mesh.points[b] - mesh.points[a]))
-        t = min(1.0, float(np.hypot(*(mesh.points[vertex] - mesh.points[a])) / length))
-        low[vertex] = min(low[vertex], (1 - t) * low[a] + t * low[b])
-        high[vertex] = max(high[vertex], (1 - t) * high[a] + t * high[b])
-        covariance[vertex] = (1 - t) * covariance[a] + t * covariance[b]
+    blend_crossings(mesh.crossings, mesh.points, low, high, covariance)
     sigma = MODELS[settings.uncertainty].sigma(mesh.points, covariance)
     return _Vertices(mesh.points, low, high, sigma)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import Counts, Floats32, Ints
+from groundmap.arrays import FARTHEST_CELL, Bools, Counts, Floats32, Ints
 from groundmap.errors import InputError
 
 TILE_SHAPES = {2: (64, 64), 3: (16, 16, 16)}
@@ -100,11 +102,66 @@ class Tiles:
         """Return the cells from `lower` up to `upper` as dense arrays; zeros without tiles."""
         shape = tuple((upper - lower).tolist())
         dense = Tile(**{name: np.zeros(shape, dtype=kind) for name, kind in LAYERS.items()})
-        for index, tile in self._held.items():
+        for index, tile in self._within(lower, upper):
             here, there = self._overlap(np.array(index), lower, upper)
             for name in LAYERS:
                 getattr(dense, name)[there] = getattr(tile, name)[here]
         return dense
+
+    def values_at(self, cells: Ints, layer: str) -> npt.NDArray[Any]:
+        """Return a layer's values in cells, shape (n, d); 0 without a tile."""
+        values = np.zeros(len(cells), dtype=LAYERS[layer])
+        for rows, index in self._by_tile(cells):
+            tile = self.get(index)
+            if tile is not None:
+                inner = cells[rows] % self.shape
+                values[rows] = getattr(tile, layer)[tuple(inner.T)]
+        return values
+
+    def _by_tile(self, cells: Ints) -> Iterator[tuple[Ints, Index]]:
+        """Yield the rows of the cells in each tile, and the tile's index."""
+        if len(cells) == 0:
+            return
+        indices = cells // self.shape
+        order = np.lexsort(indices.T[::-1])
+        changes = np.logical_or.reduce(np.diff(indices[order], axis=0) != 0, axis=1)
+        for rows in np.split(order, np.flatnonzero(changes) + 1):
+            yield rows, tuple(indices[rows[0]].tolist())
+
+    def _within(self, lower: Ints, upper: Ints) -> Iterator[tuple[Index, Tile]]:
+        """Yield the tiles that a box of cells touches: a small box's without a look at the rest."""
+        if (upper <= lower).any():
+            return
+        first, last = lower // self.shape, (upper - 1) // self.shape
+        if math.prod((last - first + 1).tolist()) <= len(self):
+            sides = (range(a, b + 1) for a, b in zip(first.tolist(), last.tolist(), strict=True))
+            for index in itertools.product(*sides):
+                tile = self._held.get(index)
+                if tile is not None:
+                    yield index, tile
+            return
+        low, high = tuple(first.tolist()), tuple(last.tolist())
+        for index, tile in self._held.items():
+            if all(a <= i <= b for a, i, b in zip(low, index, high, strict=True)):
+                yield index, tile
+
+    def main_part(self, most_cells: int) -> tuple[Ints, Ints]:
+        """Return indices of the tiles that stay, and of those that were taken away, (n, d) each.
+
+        As long as the box around them holds more than `most_cells`, the tiles are parted at the
+        widest gap along an axis, and the fewer of them are taken away; where there is no gap, the
+        box stays too large.
+        """
+        kept = np.array(sorted(self._held), dtype=np.int64).reshape(-1, len(self.shape))
+        away = [kept[:0]]
+        while math.prod((np.ptp(kept, axis=0) + 1).tolist()) * math.prod(self.shape) > most_cells:
+            lower = _beyond_widest_gap(kept)
+            if lower is None:
+                break
+            fewer = lower if 2 * int(lower.sum()) < len(kept) else ~lower
+            away.append(kept[fewer])
+            kept = kept[~fewer]
+        return kept, np.concatenate(away)
 
     def to_arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return all tiles stacked, one array per layer, and their indices as ``tiles``."""
@@ -122,13 +179,17 @@ class Tiles:
         Raises
         ------
         InputError
-            Another type or shape, a tile that comes twice, confidence beyond [-1, 1].
+            Another type or shape, a tile that comes twice or lies too far off, confidence beyond
+            [-1, 1].
         KeyError
             A layer is missing.
         """
         tiles = cls(ndim)
         indices = arrays["tiles"]
         _check_array("tiles", indices, np.int64, (len(indices), ndim))
+        farthest = FARTHEST_CELL // max(tiles.shape)
+        if ((indices > farthest) | (indices < -farthest)).any():
+            raise InputError("tiles", f"indices within {farthest}", "one beyond")
         if len(np.unique(indices, axis=0)) != len(indices):
             raise InputError("tiles", "each tile once", "one that comes twice")
         for name, kind in LAYERS.items():
@@ -149,6 +210,17 @@ class Tiles:
         in_tile = tuple(map(slice, start - corner, stop - corner))
         in_box = tuple(map(slice, start - lower, stop - lower))
         return in_tile, in_box
+
+
+def _beyond_widest_gap(indices: Ints) -> Bools | None:
+    """Return which indices lie below the widest gap along an axis; None where there is no gap."""
+    widest, below = 1, None
+    for along in indices.T:
+        places = np.unique(along)
+        gaps = np.diff(places)
+        if len(gaps) and gaps.max() > widest:
+            widest, below = int(gaps.max()), along <= places[gaps.argmax()]
+    return below
 
 
 def _check_array(

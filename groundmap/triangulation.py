@@ -14,6 +14,7 @@ from groundmap.arrays import Bools, Floats, Ints, as_floats, check_finite
 from groundmap.errors import InputError
 
 MERGE_DISTANCE = 1e-3  # [m], nearer points are one vertex
+NINE_SQUARES = [(i, j) for i in (-1.0, 0.0, 1.0) for j in (-1.0, 0.0, 1.0)]
 NODING_GRID = 1e-3  # [m], where crossings snap to if the library can't resolve them
 
 
@@ -103,17 +104,40 @@ def _merge_duplicates(xy: Floats) -> tuple[Floats, Ints]:
     point moves farther than that, however long a chain of near points is.
     """
     _, first, group = np.unique(xy, axis=0, return_index=True, return_inverse=True)
-    stands_for = first[group.reshape(-1)]  # equal points first: they would be pairs by the square
     distinct = np.sort(first)
-    pairs = KDTree(xy[distinct]).query_pairs(MERGE_DISTANCE, output_type="ndarray")
-    absorbed: dict[int, int] = {}
-    for i, j in sorted(map(tuple, np.sort(distinct[pairs], axis=1).tolist())):
-        if i not in absorbed and j not in absorbed:
-            absorbed[j] = i
-    for point, vertex in absorbed.items():
-        stands_for[stands_for == point] = vertex
+    stands_for = np.arange(len(xy))
+    stands_for[distinct] = distinct[_first_nearby(xy[distinct])]
+    stands_for = stands_for[first[group.reshape(-1)]]
     kept = np.unique(stands_for)
     return xy[kept], np.searchsorted(kept, stands_for)
+
+
+def _first_nearby(xy: Floats) -> Ints:
+    """Return, for each of distinct points, the first of those kept within a millimetre, or itself.
+
+    A point is kept if none before it was kept that near.
+    """
+    stands_for = np.arange(len(xy))
+    # A little farther than asked for, as the search leaves out what lies on its bound.
+    apart, _ = KDTree(xy).query(xy, k=[2], distance_upper_bound=2 * MERGE_DISTANCE)
+    crowded = np.flatnonzero(np.isfinite(apart[:, 0]))
+    # At most four of those kept fit into a square of a millimetre, so that each point meets few.
+    squares = np.floor(xy[crowded] / MERGE_DISTANCE).tolist()
+    kept: dict[tuple[float, float], list[tuple[int, float, float]]] = {}
+    for point, (x, y), (col, row) in zip(
+        crowded.tolist(), xy[crowded].tolist(), squares, strict=True
+    ):
+        near = [
+            number
+            for i, j in NINE_SQUARES
+            for number, a, b in kept.get((col + i, row + j), ())
+            if (a - x) ** 2 + (b - y) ** 2 <= MERGE_DISTANCE**2
+        ]
+        if near:
+            stands_for[point] = min(near)
+        else:
+            kept.setdefault((col, row), []).append((point, x, y))
+    return stands_for
 
 
 def _insert(vertices: Floats, constraints: Ints, source: Ints) -> Mesh:
@@ -211,6 +235,8 @@ def _noded(vertices: Floats, constraints: Ints, source: Ints) -> Mesh:
 
 def _segments_through(points: Floats, lattice: Floats, constraints: Ints) -> Ints:
     """Return (point, a, b) for every segment a-b that passes a lattice point within one unit."""
-    lines = shapely.linestrings(lattice[constraints])
-    point, line = np.nonzero(shapely.dwithin(shapely.points(points)[:, None], lines, 1.0))
+    lines = shapely.STRtree(shapely.linestrings(lattice[constraints]))
+    point, line = lines.query(shapely.points(points), predicate="dwithin", distance=1.0)
+    order = np.lexsort((line, point))
+    point, line = point[order], line[order]
     return np.column_stack([point, constraints[line]]).astype(np.int64)

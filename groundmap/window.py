@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import Bools, Bytes, Counts, Floats, Floats32, Ints, as_floats, check_finite
+from groundmap.arrays import (
+    FARTHEST_CELL,
+    Bools,
+    Bytes,
+    Counts,
+    Floats,
+    Floats32,
+    Ints,
+    as_cells,
+    as_positions,
+)
 
 EPSILON = 0.01  # |confidence| below this is contested
 DROP_OFF_VIEWS = 3  # a drop-off seen in this many views is non-free, whatever the average says
@@ -69,17 +80,25 @@ class GridWindow:
 
 
 def cells_of(xy: npt.ArrayLike, origin: Floats, resolution: float) -> Ints:
-    """Return the cells of positions: axes reversed, borders belong to the cell they open."""
-    positions = as_floats(
-        "xy", np.atleast_2d(np.asarray(xy, dtype=np.float64)), (None, len(origin))
-    )
-    check_finite("xy", positions)
-    # Beyond what int64 holds there is nothing: any far cell will do.
-    scaled = np.clip((positions - origin) / resolution, -(2.0**62), 2.0**62)
-    return np.floor(scaled).astype(np.int64)[:, ::-1]
+    """Return the cells of positions: axes reversed, borders belong to the cell they open.
+
+    Positions beyond `FARTHEST_CELL`, where no grid has anything, get that cell.
+    """
+    positions = as_positions("xy", xy, len(origin))
+    return scaled_cells(np.floor, positions, origin, resolution)
+
+
+def scaled_cells(
+    rounded: Callable[[Floats], Floats], positions: Floats, origin: Floats, resolution: float
+) -> Ints:
+    """Return positions, shape (n, d), in cells ``[row, col]``, rounded up or down."""
+    with np.errstate(over="ignore"):
+        scaled = (positions - origin) / resolution
+    cells = np.clip(rounded(scaled), -FARTHEST_CELL, FARTHEST_CELL)
+    return cells.astype(np.int64)[:, ::-1]
 
 
 def centres_of(cells: npt.ArrayLike, origin: Floats, resolution: float) -> Floats:
     """Return the centres of cells."""
-    index = np.atleast_2d(np.asarray(cells, dtype=np.int64))
+    index = as_cells("cells", cells, len(origin))
     return origin + (index[:, ::-1] + 0.5) * resolution

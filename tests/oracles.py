@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from collections import Counter
+from collections.abc import Callable
 from itertools import combinations
 from typing import TypeAlias
 
@@ -375,3 +377,25 @@ def cell_boxes(cells: list[Cell], resolution: float) -> Floats:
     rows, cols = np.array(cells, dtype=np.float64).reshape(-1, 2).T * resolution
     boxes: Floats = shapely.box(cols, rows, cols + resolution, rows + resolution)
     return boxes
+
+
+def peak_memory(work: Callable[[], object]) -> int:
+    """Return how many bytes of NumPy's and Python's `work` holds at most, beyond what is there."""
+    tracemalloc.start()
+    try:
+        work()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def first_nearby(points: Floats, distance: float) -> list[int]:
+    """Return which point each becomes: the first of those kept within a distance, or itself."""
+    kept: list[int] = []
+    stands_for = []
+    for number, place in enumerate(points):
+        near = [k for k in kept if ((points[k] - place) ** 2).sum() <= distance**2]
+        stands_for.append(near[0] if near else number)
+        if not near:
+            kept.append(number)
+    return stands_for

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from groundmap import ConfidenceGrid, Features, StereoRig, View, read_views
-from groundmap.arrays import Floats
+from groundmap.arrays import Bools, Floats
 from groundmap.errors import InputError, NoGroundPlaneError
 from groundmap.evaluate import FOLDS, PROTOCOLS, Verdict, evaluate
-from groundmap.judge import HeldOut, judge
+from groundmap.judge import HeldOut, judge, near_nonfree
+from oracles import peak_memory
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 NONE = np.empty((0, 2))
@@ -113,6 +114,24 @@ def test_a_protocol_judges_everything_once_and_maps_nothing_that_it_judges(name:
     assert sorted(judged) == [
         (number, landmark) for number in range(10) for landmark in range(1000)
     ]
+
+
+def test_small_cells_around_many_points_do_not_fill_the_memory() -> None:
+    grid = ConfidenceGrid(resolution=0.005)
+    z = np.full((400, 400), -1.0, dtype=np.float32)
+    z[200, 200] = 1.0
+    grid.fuse(np.array([0, 0]), z)
+    window = grid.window()
+    states = window.states()
+    points = np.random.default_rng(0).uniform(0.4, 1.6, (2000, 2))
+    near: list[Bools] = []
+
+    def work() -> None:
+        near.append(near_nonfree(window, states, points))
+
+    assert peak_memory(work) < 100e6  # the boxes of all points take 1 GB
+    apart = np.maximum(np.abs(points - 1.0025) - 0.0025, 0.0)
+    np.testing.assert_array_equal(near[0], np.hypot(*apart.T) <= 0.3)
 
 
 def test_a_short_log_is_refused() -> None:

@@ -14,8 +14,9 @@ from hypothesis.extra import numpy as hnp
 
 from dense_grid import rounding_of_mean
 from groundmap.arrays import Counts, Floats32
-from groundmap.errors import InputError
+from groundmap.errors import InputError, SettingsError
 from groundmap.fusion import RULES, Average, Capped, UpdateRule, rule_from
+from groundmap.settings import MapperSettings
 from groundmap.window import EPSILON
 
 evidence = st.one_of(st.just(0.0), st.just(-0.0), st.floats(-1.0, 1.0, width=32))
@@ -146,5 +147,53 @@ def test_an_unknown_rule_is_refused_with_the_known_ones(described: dict[str, obj
 
 @pytest.mark.parametrize("cap", [0, -1])
 def test_a_cap_below_one_is_refused(cap: int) -> None:
-    with pytest.raises(InputError, match=r"^cap: expected a count of 1 or more"):
+    with pytest.raises(InputError, match=r"^cap: expected a count of 1 to 4294967295"):
         Capped(cap)
+
+
+MOST = 2**32 - 1
+counts = st.one_of(st.integers(0, 3), st.integers(MOST - 3, MOST), st.integers(0, MOST))
+beliefs = st.floats(-1.0, 1.0, width=32)
+
+
+def cell_of(confidence: float, count: int) -> tuple[Floats32, Counts]:
+    return np.array([confidence], dtype=np.float32), np.array([count], dtype=np.uint32)
+
+
+@given(beliefs, counts, beliefs, counts)
+def test_merged_counts_stop_at_their_largest(a: float, k: int, b: float, n: int) -> None:
+    confidence, count = cell_of(a, k)
+    Average().merge(confidence, count, *cell_of(b, n))
+    assert count[0] == min(k + n, MOST)
+    mean = (k * a + n * b) / (k + n) if k + n else a
+    assert confidence[0] == np.float32(a if n == 0 else mean)
+
+
+@given(beliefs, counts, beliefs.filter(bool), st.one_of(st.just(MOST), st.integers(1, MOST)))
+def test_counts_of_views_stop_at_their_largest(a: float, k: int, z: float, cap: int) -> None:
+    for rule, most in ((Average(), MOST), (Capped(cap), cap)):
+        confidence, count = cell_of(a, k)
+        rule.update(confidence, count, np.array([z], dtype=np.float32))
+        assert count[0] == max(k, min(k + 1, most))
+        assert -1.0 <= confidence[0] <= 1.0
+
+
+@pytest.mark.parametrize("cap", [2**32, 2**64, -(10**5000), 10**5000], ids=lambda n: n.bit_length())
+def test_a_cap_that_no_count_reaches_is_refused(cap: int) -> None:
+    with pytest.raises(
+        InputError, match=r"^cap: expected a count of 1 to 4294967295, got .{1,20}$"
+    ):
+        Capped(cap)
+
+
+@pytest.mark.parametrize("cap", [2**32, 2**64])
+def test_a_setting_of_a_cap_that_no_count_reaches_is_refused(cap: int) -> None:
+    with pytest.raises(
+        SettingsError, match=r"^cap: expected less than or equal to 4294967295, got"
+    ):
+        MapperSettings(fusion="capped", cap=cap)
+
+
+def test_a_cap_that_is_a_truth_value_is_refused() -> None:
+    with pytest.raises(InputError, match=r"^cap: expected a count of 1 to 4294967295, got True"):
+        Capped(True)

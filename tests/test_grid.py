@@ -357,6 +357,17 @@ def test_areas_of_the_states_add_up_to_the_touched_tiles() -> None:
     assert sum(areas.values()) == 64 * 64 * cell
 
 
+def test_counts_of_drop_offs_stop_at_their_largest() -> None:
+    most = 2**32 - 1
+    one, other = ConfidenceGrid(), ConfidenceGrid()
+    one.tile((0, 0)).drop_offs[0, :3] = most, most - 1, 7
+    other.tile((0, 0)).drop_offs[0, :3] = most, 5, 5
+    assert one.merge(other).tile((0, 0)).drop_offs[0, :3].tolist() == [most, most, 12]
+    for _ in range(2):
+        one.add_drop_offs(np.array([[0, 0], [0, 1], [0, 2]]))
+    assert one.tile((0, 0)).drop_offs[0, :3].tolist() == [most, most, 9]
+
+
 cells_2d = st.tuples(st.integers(-(10**6), 10**6), st.integers(-(10**6), 10**6))
 windows = st.builds(
     GridWindow,

@@ -23,7 +23,7 @@ from groundmap.settings import MapperSettings
 from groundmap.sight2d import NO_SURFACE, SightFan, visible_freespace
 from groundmap.surfaces import SurfaceKind, Surfaces, find_surfaces
 from groundmap.triangulation import triangulate
-from oracles import counted_against, farthest, places_without_ground
+from oracles import counted_against, farthest, peak_memory, places_without_ground
 from oracles import gap_chords as all_chords
 from oracles import support_chords as single_chords
 from strategies import Cloud, flat_view, rngs, rooms
@@ -555,6 +555,15 @@ def test_where_the_ground_is_missing_sight_is_below_it_and_not_beyond_the_featur
     # The first and the last place are within half a step of the ends.
     assert share[0] * np.hypot(*place) <= np.hypot(*place) / (1.0 - height) + 0.05 + 1e-9
     assert share[-1] * np.hypot(*place) >= np.hypot(*place) - 0.05 - 1e-9
+
+
+def test_lines_below_the_ground_are_not_held_with_each_ground_feature() -> None:
+    rng = np.random.default_rng(0)
+    flat = flat_view(
+        drop_offs=rng.uniform((4.0, -3.0), (5.0, 3.0), size=(2000, 2)),
+        supports=rng.uniform((6.0, -3.0), (9.0, 3.0), size=(2000, 2)),
+    )
+    assert peak_memory(lambda: missing_ground(flat, 0.1)) < 20e6  # 4,000,000 pairs take 100 MB
 
 
 @pytest.mark.parametrize(

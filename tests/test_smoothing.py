@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from groundmap.arrays import Floats
 from groundmap.heights import FlatView
-from groundmap.kernels.smooth import smooth_along_rays
+from groundmap.kernels.smooth import MOST, smooth_along_rays
 from groundmap.settings import MapperSettings
 from groundmap.smoothing import smoothed
 from strategies import flat_view, rngs
@@ -271,3 +271,11 @@ def test_what_is_nearer_than_min_range_stays_put_even_right_below_the_camera() -
     places = [(0.0, 0.0), (3.0, 0.1), (0.2, 0.01), (0.21, 0.01), (0.22, 0.01)]
     flat = flat_view(places, [(0, 1)], heights=0.3, covariance=0.1)
     np.testing.assert_array_equal(smoothed(flat, SETTINGS).points, flat.points)
+
+
+def test_of_a_crowd_at_one_bearing_only_so_many_are_averaged() -> None:
+    inverse = np.full(2 * MOST + 3, 0.2)
+    inverse[-1] *= 1.01  # near enough to be of the same surface
+    smooth = inverse_of(smoothed(in_inverse_range(np.zeros(len(inverse)), inverse), SETTINGS))
+    assert smooth[0] == pytest.approx(0.2, abs=1e-15)
+    assert smooth[-1] == pytest.approx(0.2 + 0.002 / (MOST + 1), rel=1e-9)

@@ -15,6 +15,8 @@ from oracles import (
     components,
     deepest_intrusion,
     edge_set,
+    first_nearby,
+    peak_memory,
     sides,
     signed_areas,
     without_chain,
@@ -193,6 +195,25 @@ def test_points_within_a_millimetre_become_the_first_of_them() -> None:
     mesh = triangulate([(0, 0), (5, 0), (5.0005, 0), (0, 5), (0, 5.002)])
     assert mesh.source.tolist() == [0, 1, 1, 2, 3]
     np.testing.assert_array_equal(mesh.points, [(0, 0), (5, 0), (0, 5), (0, 5.002)])
+
+
+@settings(max_examples=200)
+@given(rngs(), st.sampled_from([0.25, 0.5, np.sqrt(0.5), 1.0]), st.sampled_from([0.0, -7.3, 1e6]))
+def test_each_point_becomes_the_first_kept_within_a_millimetre(
+    rng: np.random.Generator, step: float, away: float
+) -> None:
+    # Lattices have pairs whose distance is a millimetre but for rounding.
+    places = rng.integers(-5, 6, (rng.integers(1, 60), 2)) * step * MERGE_DISTANCE
+    points = away + places + rng.choice([0.0, 1e-4]) * rng.uniform(-1, 1, places.shape)
+    source = triangulate(points).source
+    stands_for = np.array(first_nearby(points, MERGE_DISTANCE))
+    np.testing.assert_array_equal(source, source[stands_for])
+    assert len(set(source.tolist())) == len(set(stands_for.tolist()))
+
+
+def test_points_within_a_millimetre_are_not_held_as_pairs() -> None:
+    points = np.random.default_rng(0).uniform(0.0, MERGE_DISTANCE, (2000, 2))
+    assert peak_memory(lambda: triangulate(points)) < 10e6  # 2,000,000 pairs take 300 MB
 
 
 def test_a_segment_between_near_duplicates_vanishes() -> None:

@@ -30,6 +30,7 @@ LABELS = {
     CellState.CONTESTED: "contested",
     CellState.UNKNOWN: "unknown",
 }
+MOST_DRAWN = 2**25  # cells of a picture, about 50 bytes each: more than any screen shows
 TRAJECTORY = "#1f5f8b"
 
 
@@ -39,14 +40,22 @@ def known_bounds(grid: ConfidenceGrid, *, margin: float = 1.0) -> Floats:
     Raises
     ------
     InputError
-        The grid is empty.
+        The grid is empty, or its tiles lie so far apart that no picture can show them all.
     """
-    window = grid.window()
-    rows, cols = np.nonzero(window.count)
-    if len(rows) == 0:
+    grid.check_extent(MOST_DRAWN)
+    # Tile by tile: a dense window would take the memory of the bounding box.
+    spoken = (
+        np.array(index) * grid.tile_shape + np.argwhere(tile.count) for index, tile in grid.tiles()
+    )
+    boxes = [(cells.min(axis=0), cells.max(axis=0) + 1) for cells in spoken if len(cells)]
+    if not boxes:
         raise InputError("grid", "at least one known cell", "an empty map")
-    low = window.origin + np.array([cols.min(), rows.min()]) * window.resolution
-    high = window.origin + np.array([cols.max() + 1, rows.max() + 1]) * window.resolution
+    lowest, highest = np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]
+    # From the corner of the first tile, as the window around all tiles has it.
+    first = grid.cell_bounds()[0]
+    corner = grid.origin + first[::-1] * grid.resolution
+    low = corner + (lowest - first)[::-1] * grid.resolution
+    high = corner + (highest - first)[::-1] * grid.resolution
     return np.concatenate([low - margin, high + margin])
 
 
@@ -67,12 +76,17 @@ def draw_grid(
     epsilon : float
         Confidence below which a cell is contested.
     ax : matplotlib axes, optional
+
+    Raises
+    ------
+    InputError
+        Bounds that are no box, or hold more than 2**25 cells.
     """
     from matplotlib.patches import Patch
 
     box = known_bounds(grid) if bounds is None else as_floats("bounds", bounds, (4,))
     ax = ax or new_figure(box)[1]
-    window = grid.window(box)
+    window = grid.window(box, most_cells=MOST_DRAWN)
     rows, cols = window.count.shape
     x, y = window.origin
     picture = ax.imshow(

@@ -2,28 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
+from typing import Protocol
+
+import numpy.typing as npt
 
 from groundmap.errors import InputError
 from groundmap.grid import ConfidenceGrid
 from groundmap.io.dense import write_dense
 from groundmap.io.ros_map import write_ros_map
 
-EXPORTERS: dict[str, Callable[[ConfidenceGrid, str | PathLike[str]], None]] = {
+
+class Exporter(Protocol):
+    """Writes the part of a map within bounds, all of it unless told, to a file."""
+
+    def __call__(
+        self,
+        grid: ConfidenceGrid,
+        path: str | PathLike[str],
+        *,
+        bounds: npt.ArrayLike | None = None,
+    ) -> None:
+        """Write the map."""
+
+
+EXPORTERS: dict[str, Exporter] = {
     ".npz": write_dense,
     ".yaml": write_ros_map,
 }
 
 
-def export(grid: ConfidenceGrid, path: str | PathLike[str]) -> None:
+def export(
+    grid: ConfidenceGrid, path: str | PathLike[str], *, bounds: npt.ArrayLike | None = None
+) -> None:
     """Write a map in the form that the file's suffix names, a key of `EXPORTERS`.
+
+    Parameters
+    ----------
+    grid : ConfidenceGrid
+    path : path
+    bounds : array_like, shape (2 d,), optional
+        Part to write, lower then upper corner [m, map]; all that was seen unless told.
 
     Raises
     ------
     InputError
-        Another suffix, an empty map, or one that the form can't hold.
+        Another suffix, an empty map, one that the form can't hold, bounds that are no box, or a
+        box with more cells than `ConfidenceGrid.window` returns.
     OSError
         The folder does not exist or can't be written to.
 
@@ -38,4 +64,4 @@ def export(grid: ConfidenceGrid, path: str | PathLike[str]) -> None:
     if suffix not in EXPORTERS:
         known = " or ".join(EXPORTERS)
         raise InputError("path", f"a file that ends in {known}", repr(Path(path).name))
-    EXPORTERS[suffix](grid, path)
+    EXPORTERS[suffix](grid, path, bounds=bounds)

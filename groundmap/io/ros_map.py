@@ -8,6 +8,7 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from groundmap.archive import write_atomically
 from groundmap.arrays import Bytes
@@ -29,7 +30,9 @@ OCCUPIED_THRESH = 0.65
 FREE_THRESH = 0.196
 
 
-def write_ros_map(grid: ConfidenceGrid, path: str | PathLike[str]) -> None:
+def write_ros_map(
+    grid: ConfidenceGrid, path: str | PathLike[str], *, bounds: npt.ArrayLike | None = None
+) -> None:
     """Write a 2-D map as ``NAME.yaml`` and ``NAME.pgm``, which map_server loads.
 
     Occupied is 0, free 254, unknown and contested 205. Resolution and origin are written with
@@ -40,17 +43,19 @@ def write_ros_map(grid: ConfidenceGrid, path: str | PathLike[str]) -> None:
     grid : ConfidenceGrid
     path : path
         The ``.yaml`` file; the image goes beside it.
+    bounds : array_like, shape (4,), optional
+        Part to write, xmin, ymin, xmax, ymax [m, map]; all that was seen unless told.
 
     Raises
     ------
     InputError
-        An empty map, or a 3-D one.
+        An empty map, a 3-D one, bounds that are no box, or a box with too many cells.
     OSError
         The folder does not exist or can't be written to.
     """
     if grid.ndim != 2:
         raise InputError("grid", "a 2-D map", f"a {grid.ndim}-D one", hint="Export it as .npz.")
-    window = dense_window(grid)
+    window = dense_window(grid, bounds)
     target = Path(path)
     image = target.with_suffix(".pgm")
     pgm = _pgm(window.states())

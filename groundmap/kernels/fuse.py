@@ -7,6 +7,8 @@ from numba import njit
 
 from groundmap.arrays import Counts, Floats32
 
+MOST = np.uint32(0xFFFFFFFF)
+
 
 @njit(cache=True, nogil=True)
 def update_average(confidence: Floats32, count: Counts, z: Floats32, cap: int) -> None:
@@ -22,10 +24,10 @@ def update_average(confidence: Floats32, count: Counts, z: Floats32, cap: int) -
 
 @njit(cache=True, nogil=True)
 def merge_average(confidence: Floats32, count: Counts, other: Floats32, others: Counts) -> None:
-    """Count-weighted mean of two averages, in place in the first."""
+    """Count-weighted mean of two averages, in place in the first; counts stop at their largest."""
     for i in range(other.size):
         if others[i] > 0:
             ours, theirs = np.float64(count[i]), np.float64(others[i])
             total = ours * confidence[i] + theirs * other[i]
             confidence[i] = np.float32(total / (ours + theirs))
-            count[i] += others[i]
+            count[i] += min(others[i], MOST - count[i])

@@ -47,6 +47,7 @@ def passed_through(
     passes : ndarray of bool, shape (n,)
         Set where a feature is seen through any surface.
     """
+    ranges = np.hypot(points[:, 0], points[:, 1])
     for s in range(len(ends)):
         x0, y0 = ends[s, 0, 0], ends[s, 0, 1]
         ex, ey = ends[s, 1, 0] - x0, ends[s, 1, 1] - y0
@@ -62,15 +63,46 @@ def passed_through(
             if facing == 0.0:
                 continue
             share = (x0 * ey - y0 * ex) / facing  # range of the surface / of the feature
+            if share >= 1.0:  # in front of the surface
+                continue
             t = ((x * share - x0) * ex + (y * share - y0) * ey) / square
             t = min(max(t, 0.0), 1.0)
-            away = (1.0 - share) * np.hypot(x, y)
+            away = (1.0 - share) * ranges[row - 1]
             if away <= 2.0 * ((1 - t) * reach[s, 0] + t * reach[s, 1]) + behind:
                 continue
             sight = camera_height + (heights[row - 1] - camera_height) * share
             if sight < (1 - t) * tops[s, 0] + t * tops[s, 1] - below:
                 against[s] += shares[row - 1]
                 passes[row - 1] = True
+
+
+@njit(cache=True, nogil=True)
+def features_beside(
+    rays: Floats, first: Floats, last: Floats, points: Floats, width: float, beside: Bools
+) -> None:
+    """Tell which lines of sight have a point beside them.
+
+    Parameters
+    ----------
+    rays : ndarray, shape (n, 2)
+        Directions of the lines, of length 1.
+    first, last : ndarray, shape (n,)
+        Between which distances along the line a point counts.
+    points : ndarray, shape (k, 2)
+    width : float
+        How far across the line a point may be.
+    beside : ndarray of bool, shape (n,)
+        Set to the answer.
+    """
+    for i in range(len(rays)):
+        x, y = rays[i]
+        beside[i] = False
+        for k in range(len(points)):
+            if abs(x * points[k, 1] - y * points[k, 0]) < width:
+                along = x * points[k, 0] + y * points[k, 1]
+                if first[i] < along < last[i]:
+                    beside[i] = True
+                    break
 
 
 @njit(cache=True, nogil=True)

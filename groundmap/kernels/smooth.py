@@ -8,6 +8,7 @@ from numba import njit
 from groundmap.arrays import Floats
 
 WIDEST = 0.2  # [rad], of a neighbourhood to either side
+MOST = 2048  # neighbours to either side: more say nothing new, and all of all would be a square
 FEWEST = 3  # neighbours, itself included, to average; one more, to fit a slope
 STIFFEST = 1e-3  # of the fit's determinant: below this the neighbours are all at one bearing
 
@@ -41,9 +42,9 @@ def smooth_along_rays(
     for i in range(count):
         width = min(half_width * inverse[i], WIDEST)
         first, last = i, i
-        while first > 0 and bearings[i] - bearings[first - 1] <= width:
+        while first > max(i - MOST, 0) and bearings[i] - bearings[first - 1] <= width:
             first -= 1
-        while last + 1 < count and bearings[last + 1] - bearings[i] <= width:
+        while last < min(i + MOST, count - 1) and bearings[last + 1] - bearings[i] <= width:
             last += 1
         s0 = s1 = s2 = t0 = t1 = 0.0
         neighbours, farthest, nearest = 0, inverse[i], inverse[i]

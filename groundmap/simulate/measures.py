@@ -81,8 +81,7 @@ def _mean(values: Floats | Bools) -> float | None:
 
 def _cells_holding(window: GridWindow, points: Floats) -> Bools:
     held = np.zeros(window.count.shape, dtype=np.bool_)
-    if len(points):
-        cells, distance = cells_around(window, points, 2.0 * HAIR)
+    for cells, distance in cells_around(window, points, 2.0 * HAIR):
         near = window.contains(cells) & (distance <= 2.0 * HAIR)
         held[tuple(cells[near].T)] = True
     return held

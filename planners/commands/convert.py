@@ -9,7 +9,7 @@ import typer
 
 from groundmap.archive import check_writable
 from groundmap.io import export, files_of, load_map
-from planners.console import JsonOption, emit
+from planners.console import JsonOption, emit, numbers
 
 
 def convert_command(
@@ -20,9 +20,17 @@ def convert_command(
         Path,
         typer.Argument(help=".npz: dense arrays; .yaml: Nav2's map_server (with a .pgm beside)."),
     ],
+    bounds: Annotated[
+        str | None,
+        typer.Option(
+            metavar="XMIN,YMIN,XMAX,YMAX",
+            help="Part to write [m], of a 3-D map with ZMIN and ZMAX; all unless told.",
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Write a map in another program's form."""
     check_writable(out, sources=files_of(map_file))
-    export(load_map(map_file), out)
+    box = None if bounds is None else numbers("bounds", bounds, 4, 6)
+    export(load_map(map_file), out, bounds=box)
     emit({"out": str(out)}, as_json=as_json, title=f"converted {map_file}")

@@ -7,15 +7,18 @@ from typing import Annotated, Any
 
 import typer
 
-from groundmap import CellState, GroundMapper, View, fit_ground, read_views
+from groundmap import CellState, GroundMapper, View, fit_ground, pose_jumps, read_views
 from groundmap.archive import check_writable
+from groundmap.arrays import Floats
 from groundmap.diagnosis import SAMPLE, describe_dropped, likely_mistakes
 from groundmap.errors import InputError
+from groundmap.jumps import Jump
 from groundmap.mapper import warm_up
 from groundmap.stages import Stages
 from planners.commands.settings_file import ConfigOption, read_settings
 from planners.console import JsonOption, emit, say, seconds_since_start, watched
 
+SHOWN_JUMPS = 5  # of the poses, one line each
 NOT_MAPPING = {"startup", "read", "compile", "save", "other"}
 
 
@@ -69,16 +72,21 @@ def map_command(
         raise InputError(str(source), "at least one view", "none")
     views = fit_ground(stages.each("read", log), camera_height=camera_height, **tables["ground"])
     sample: list[View] = []
+    positions: list[Floats] = []
+    times: list[float | None] = []
     for view in watched(stages.each("ground", views), total=total, what="mapping views"):
         mapper.integrate(view)
+        positions.append(view.T_map_base[:3, 3])
+        times.append(view.timestamp)
         if len(sample) < SAMPLE:
             sample.append(view)
-    warnings = _warnings(mapper, sample)
+    jumps = _jumps(positions, times)
+    warnings = _warnings(mapper, sample) + _jump_warnings(jumps)
     for warning in warnings:
         say(f"warning: {warning}")
     with stages.timed("save"):
         mapper.grid.save(out)
-    summary = _summary(mapper, stages, out) | {"warnings": warnings}
+    summary = _summary(mapper, jumps, stages, out) | {"warnings": warnings}
     emit(summary, as_json=as_json, title=f"map of {source}")
 
 
@@ -98,7 +106,26 @@ def _warnings(mapper: GroundMapper, sample: list[View]) -> list[str]:
     return warnings
 
 
-def _summary(mapper: GroundMapper, stages: Stages, out: Path) -> dict[str, Any]:
+def _jumps(positions: list[Floats], times: list[float | None]) -> list[Jump]:
+    """Return the jumps of the poses."""
+    known = [time for time in times if time is not None]
+    return pose_jumps(positions, known if len(known) == len(times) else None)
+
+
+def _jump_warnings(jumps: list[Jump]) -> list[str]:
+    """Return a warning for each of the first jumps of the poses."""
+    warnings = [
+        f"the pose of view {jump.view} is {jump.step:.4g} m from that of view {jump.view - 1}, "
+        f"where steps are {jump.typical_step:.2g} m: is one of them wrong? What is seen from a "
+        "wrong pose lies at a wrong place in the map."
+        for jump in jumps[:SHOWN_JUMPS]
+    ]
+    if len(jumps) > SHOWN_JUMPS:
+        warnings.append(f"{len(jumps) - SHOWN_JUMPS} more poses jump; --json lists them")
+    return warnings
+
+
+def _summary(mapper: GroundMapper, jumps: list[Jump], stages: Stages, out: Path) -> dict[str, Any]:
     grid, stats = mapper.grid, mapper.stats
     area = {state: grid.area(state) for state in (CellState.FREE, CellState.NONFREE)}
     seconds = stages.stop()
@@ -110,6 +137,7 @@ def _summary(mapper: GroundMapper, stages: Stages, out: Path) -> dict[str, Any]:
         "features_dropped": dict(stats.features_dropped),
         "seen_through": stats.seen_through,
         "through_viewpoint": stats.through_viewpoint,
+        "pose_jumps": [jump._asdict() for jump in jumps],
         "area_free_m2": area[CellState.FREE],
         "area_nonfree_m2": area[CellState.NONFREE],
         "resolution": grid.resolution,

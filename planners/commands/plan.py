@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 from groundmap.archive import check_writable
-from groundmap.draw import check_picture
+from groundmap.draw import check_picture, known_bounds
 from groundmap.io import files_of, load_map
 from groundmap.io.map_images import BlockedMap, grid_of
 from planners.commands.options import assignments, outline
@@ -118,6 +118,7 @@ def plan_command(
     grid = load_map(map_file)
     if plot is not None:
         check_flat(grid, map_file)
+        known_bounds(grid)  # a map too large to draw is refused before the search
     problem = PlanningProblem(
         grid,
         start=numbers("start", start, 2, 3),
