@@ -10,6 +10,7 @@ import json
 import os
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from os import PathLike
 from pathlib import Path
 from typing import IO, Any
@@ -17,14 +18,20 @@ from typing import IO, Any
 import numpy as np
 import numpy.typing as npt
 
+from groundmap.array_files import read_arrays
+from groundmap.documents import WrongDocumentError, parse_json
 from groundmap.errors import FileFormatError
+from groundmap.files import reason_of
+
+TEMPORARY = ".groundmap-"  # what the names of files begin with until they are whole
 
 
 def write_atomically(path: str | PathLike[str], write: Callable[[IO[bytes]], object]) -> None:
     """Call `write` on a temporary file beside `path`, then rename it: all or nothing."""
     target = Path(path)
     _check_regular(target)
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    # Its name does not hold the target's, which may be as long as the system takes.
+    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=TEMPORARY)
     try:
         with os.fdopen(handle, "wb") as stream:
             write(stream)
@@ -64,19 +71,11 @@ def read_archive(
     FileFormatError
         Missing, no archive, truncated, of another format or of a newer version.
     """
+    arrays = read_arrays(path, f"a {expected_format} file")
     try:
-        # Opened here: np.load leaves a broken archive's file open.
-        with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-        header = json.loads(str(arrays.pop("header")))
-    except FileNotFoundError as error:
-        raise FileFormatError(path, f"a {expected_format} file", "no file of that name") from error
-    except IsADirectoryError as error:
-        raise FileFormatError(path, f"a {expected_format} file", "a folder") from error
-    except Exception as error:  # damaged bytes make NumPy, zipfile and zlib raise nearly anything
-        raise FileFormatError(
-            path, f"a {expected_format} file", f"something else ({type(error).__name__})"
-        ) from error
+        header = parse_json(str(arrays.pop("header")))
+    except (KeyError, WrongDocumentError):  # some other program's archive
+        header = None
     if not isinstance(header, dict) or header.get("format") != expected_format:
         raise FileFormatError(path, f"a {expected_format} file", "another kind of archive")
     version = header.get("version")
@@ -97,13 +96,31 @@ def check_writable(
 ) -> None:
     """Check that a file can be written there, before the work whose result it is to hold.
 
+    An empty file is made in its folder, and removed: nothing else shows what may be written.
+
     Raises
     ------
     FileFormatError
-        The folder does not exist, the path is a folder, a device or the like, or it is one of
-        the files `sources` that the work reads.
+        A folder that does not exist or can't be written to, a path that is a folder, a device or
+        the like, a name that no file can have, or that of one of the files `sources` that the
+        work reads.
     """
     target = Path(path)
+    try:
+        _check_target(target, sources)
+        with tempfile.TemporaryFile(dir=target.parent, prefix=TEMPORARY):
+            pass
+    except OSError as error:
+        raise FileFormatError(target, "a file that can be written", reason_of(error)) from error
+    except (ValueError, RuntimeError) as error:  # NUL or an unpaired surrogate; links in a circle
+        if isinstance(error, FileFormatError):
+            raise
+        raise FileFormatError(target, "a file that can be written", "no such name") from error
+
+
+def _check_target(target: Path, sources: Iterable[str | PathLike[str]]) -> None:
+    with suppress(FileNotFoundError, NotADirectoryError):
+        target.lstat()  # says what no name can be, such as one that is too long
     if target.is_dir():
         raise FileFormatError(target, "a file name", "a folder")
     if target.resolve() in [Path(source).resolve() for source in sources]:

@@ -19,13 +19,30 @@ from __future__ import annotations
 from os import PathLike
 from typing import Any
 
+from groundmap.printable import MOST_OF_A_VALUE, printable
+
+MOST_OF_A_FACT = 1000  # characters of what was expected, or of a hint: some list all names
+
 
 class FactualError(Exception):
-    """An exception that composes its message from facts, and survives pickling with them.
+    r"""An exception that composes its message from facts, and survives pickling with them.
 
     Both packages' trees grow from it. Python would call the class again with the finished message;
     a worker process that raises one would then die of a TypeError instead.
+
+    Parameters
+    ----------
+    message : str
+        Unprintable characters are escaped, and what is too long is cut in the middle.
+
+    Examples
+    --------
+    >>> print(FactualError("frame \x1b[31m"))
+    frame \x1b[31m
     """
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(printable(message))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Carry message and facts over as they are."""
@@ -47,7 +64,8 @@ class WrongValueError(FactualError, ValueError):
     name : str
         What the value is called where the caller wrote it.
     expected, got : str
-        What it should have been, and what it is.
+        What it should have been, and what it is. Like all facts they are made printable, and
+        cut in the middle if they are too long for a sentence.
     where : str, optional
         The first place that offends, such as ``"row 3"``.
     hint : str, optional
@@ -57,10 +75,15 @@ class WrongValueError(FactualError, ValueError):
     def __init__(
         self, name: str, expected: str, got: str, *, where: str = "", hint: str = ""
     ) -> None:
-        self.name, self.expected, self.got, self.where, self.hint = name, expected, got, where, hint
-        place = f" at {where}" if where else ""
-        advice = f" {hint}" if hint else ""
-        super().__init__(f"{name}: expected {expected}, got {got}{place}.{advice}")
+        self.name, self.got, self.where = (
+            printable(fact, most=MOST_OF_A_VALUE) for fact in (name, got, where)
+        )
+        self.expected, self.hint = (
+            printable(fact, most=MOST_OF_A_FACT) for fact in (expected, hint)
+        )
+        place = f" at {self.where}" if where else ""
+        advice = f" {self.hint}" if hint else ""
+        super().__init__(f"{self.name}: expected {self.expected}, got {self.got}{place}.{advice}")
 
 
 class GroundmapError(FactualError):

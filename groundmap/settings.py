@@ -8,6 +8,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from groundmap.errors import SettingsError
+from groundmap.printable import shown
 
 
 class Settings(BaseModel):
@@ -48,7 +49,7 @@ unknown key. Did you mean 'resolution'?
             if first["type"] == "missing":
                 raise SettingsError(name, "a value", "none") from None
             expected = first["msg"].removeprefix("Input should be ")
-            raise SettingsError(name, expected, repr(first["input"])) from None
+            raise SettingsError(name, expected, shown(first["input"])) from None
         self.check()
 
     def check(self) -> None:

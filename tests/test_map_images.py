@@ -137,19 +137,20 @@ def test_a_missing_key_is_named(tmp_path: Path, key: str) -> None:
     ("keys", "message"),
     [
         ({"resolution": "wide"}, "a number for 'resolution', got 'wide'"),
-        ({"resolution": None}, "a number for 'resolution', got None"),
-        ({"resolution": float("nan")}, "a number for 'resolution', got nan"),
+        ({"resolution": None}, "a number for 'resolution', got 'null'"),
+        ({"resolution": float("nan")}, r"a number for 'resolution', got '\.nan'"),
         ({"resolution": 0}, r"resolution above 0 \[m\], got 0"),
-        ({"origin": 3}, r"an origin of \[x, y, yaw\], got 3"),
-        ({"origin": [0, 0]}, r"an origin of \[x, y, yaw\], got \[0, 0\]"),
+        ({"origin": 3}, r"an origin of \[x, y, yaw\], got '3'"),
+        ({"origin": [0, 0]}, r"an origin of \[x, y, yaw\], got \['0', '0'\]"),
         ({"origin": [0, "east", 0]}, "a number for 'origin', got 'east'"),
         ({"origin": [0, 0, 1.5]}, "an origin of yaw 0, got 1.5. Turn the image"),
-        ({"negate": 2}, "negate 0 or 1, got 2"),
+        ({"negate": 2}, "negate 0 or 1, got '2'"),
         ({"occupied_thresh": 0.1}, "free_thresh <= occupied_thresh <= 1, got 0.196 and 0.1"),
         ({"occupied_thresh": 65}, "free_thresh <= occupied_thresh <= 1, got 0.196 and 65"),
         ({"free_thresh": -0.1}, "0 <= free_thresh .*, got -0.1 and 0.65"),
         ({"mode": "raw"}, "mode trinary, got 'raw'"),
-        ({"image": 7}, "the name of an image, got 7"),
+        ({"image": [7]}, r"the name of an image, got \['7'\]"),
+        ({"image": ""}, "the name of an image, got ''"),
     ],
 )
 def test_a_value_that_cannot_be_is_refused(
@@ -162,7 +163,7 @@ def test_a_value_that_cannot_be_is_refused(
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("image: [\n", "expected YAML, got something else at line 2"),
+        ("image: [\n", r"expected YAML, got something else \(expected the node content, .*\) at line 2"),
         ("image: a\x00b\n", "expected YAML, got something else"),
         ("", "expected keys and values, got an empty file"),
         ("- image\n", "expected keys and values, got a list"),
@@ -175,7 +176,7 @@ def test_a_yaml_file_of_something_else_is_refused(tmp_path: Path, text: str, mes
 
 
 def test_a_missing_yaml_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(FileFormatError, match=r"gone.yaml: expected a readable file, got no such"):
+    with pytest.raises(FileFormatError, match=r"gone.yaml: expected a YAML file, got no file"):
         read_ros_map(tmp_path / "gone.yaml")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -12,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from groundmap.array_files import read_arrays
 from groundmap.arrays import as_floats
 from groundmap.camera import StereoRig
 from groundmap.errors import FileFormatError, InputError
@@ -107,24 +107,13 @@ def read_npz(path: Path) -> dict[Kind, FeatureTable]:
     FileFormatError
         No archive, other arrays than described, ids that are not whole numbers.
     """
-    arrays = _load(path)
+    arrays = read_arrays(path)
     known = [*KINDS, *(f"{kind}_columns" for kind in KINDS)]
     unknown = sorted(set(arrays) - set(known))
     if unknown or not set(arrays) & set(KINDS):
         got = f"{unknown[0]!r}" if unknown else "neither points nor segments"
         raise FileFormatError(path, f"arrays named {', '.join(known)}", got)
     return {kind: _array_table(path, kind, arrays) for kind in KINDS}
-
-
-def _load(path: Path) -> dict[str, npt.NDArray[Any]]:
-    try:
-        # NumPy leaves a file it opened itself open when it is no archive.
-        with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
-    except (zipfile.BadZipFile, ValueError, TypeError, AttributeError, EOFError, OSError) as error:
-        raise FileFormatError(
-            path, "an archive of arrays (npz)", f"something else ({type(error).__name__})"
-        ) from error
 
 
 def _array_table(path: Path, kind: Kind, arrays: dict[str, npt.NDArray[Any]]) -> ArrayTable:

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import math
+import re
 from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import yaml
-from PIL import Image
 
-from groundmap.arrays import Bools, Floats
+from groundmap.arrays import Bools
+from groundmap.documents import read_yaml
 from groundmap.errors import FileFormatError
 from groundmap.grid import ConfidenceGrid
-from groundmap.io.rows import opened
+from groundmap.io.greys import read_greys
+from groundmap.printable import shown
 
 ROS_KEYS = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
+NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+NEGATE = {"0": False, "false": False, "no": False, "off": False,
+          "1": True, "true": True, "yes": True, "on": True}  # fmt: skip
+MOST_TURN = 1e-9  # [rad]: over a million cells, a thousandth of one
 
 
 class BlockedMap(NamedTuple):
@@ -77,21 +82,24 @@ def read_ros_map(path: str | PathLike[str]) -> BlockedMap:
         map turned against its axes.
     """
     path = Path(path)
-    keys = _read_yaml(path)
-    resolution = _number(path, keys, "resolution")
+    keys = _read_keys(path)
+    resolution = _number(path, keys["resolution"], "resolution")
     if resolution <= 0:
         raise FileFormatError(path, "resolution above 0 [m]", f"{resolution:g}")
-    free, occupied = _number(path, keys, "free_thresh"), _number(path, keys, "occupied_thresh")
+    free, occupied = (_number(path, keys[key], key) for key in ("free_thresh", "occupied_thresh"))
     if not 0 <= free <= occupied <= 1:
         got = f"{free:g} and {occupied:g}"
         raise FileFormatError(path, "0 <= free_thresh <= occupied_thresh <= 1", got)
-    negate = _number(path, keys, "negate")
-    if negate not in (0, 1):
-        raise FileFormatError(path, "negate 0 or 1", f"{negate:g}")
+    negate = _negate(path, keys["negate"])
     origin = _origin(path, keys["origin"])
-    darkness = _read_darkness(path, keys["image"], negate=bool(negate))[::-1]
+    grey, white = read_greys(path.parent / _image(path, keys), f"the image of {path.name}")
+    levels = np.arange(white + 1)
+    # In whole numbers up to the quotient: grey 205 is the float nearest to 50 / 255, and a
+    # threshold that says the same is met exactly.
+    darkness = (levels if negate else white - levels) / white
     blocked = darkness > occupied
-    return BlockedMap(blocked, ~blocked & (darkness >= free), resolution, origin)
+    unknown = ~blocked & (darkness >= free)
+    return BlockedMap(blocked[grey[::-1]], unknown[grey[::-1]], resolution, origin)
 
 
 def image_of(path: Path) -> Path:
@@ -102,67 +110,47 @@ def image_of(path: Path) -> Path:
     FileFormatError
         A file that is missing or can't be read, or names no image.
     """
-    name = _read_yaml(path)["image"]
-    if not isinstance(name, str):
-        raise FileFormatError(path, "the name of an image", repr(name))
-    return path.parent / name
+    return path.parent / _image(path, _read_keys(path))
 
 
-def _read_yaml(path: Path) -> dict[str, Any]:
-    with opened(path) as stream:
-        try:
-            keys = yaml.safe_load(stream)
-        except yaml.YAMLError as error:
-            mark = getattr(error, "problem_mark", None)
-            line = None if mark is None else mark.line + 1
-            raise FileFormatError(path, "YAML", "something else", line=line) from error
+def _image(path: Path, keys: dict[str, Any]) -> str:
+    name = keys["image"]
+    if not isinstance(name, str) or not name:
+        raise FileFormatError(path, "the name of an image", shown(name))
+    return name
+
+
+def _read_keys(path: Path) -> dict[str, Any]:
+    keys = read_yaml(path)
     if not isinstance(keys, dict):
-        got = "an empty file" if keys is None else f"a {type(keys).__name__}"
+        got = "a list" if isinstance(keys, list) else "text" if keys else "an empty file"
         raise FileFormatError(path, "keys and values", got)
     for key in ROS_KEYS:
         if key not in keys:
             raise FileFormatError(path, f"the key {key!r}", "none")
-    if keys.get("mode", "trinary") != "trinary":
-        raise FileFormatError(path, "mode trinary", repr(keys["mode"]))
+    mode = keys.get("mode", "trinary")
+    if not isinstance(mode, str) or mode.lower() != "trinary":
+        raise FileFormatError(path, "mode trinary", shown(mode))
     return keys
 
 
-def _number(path: Path, keys: dict[str, Any], key: str) -> float:
-    try:
-        number = float(keys[key])  # 1e-05 is text to YAML 1.1, and a number to map_server
-    except (TypeError, ValueError):
-        number = math.nan
+def _number(path: Path, text: Any, key: str) -> float:
+    number = float(text) if isinstance(text, str) and NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(number):
-        raise FileFormatError(path, f"a number for {key!r}", repr(keys[key]))
+        raise FileFormatError(path, f"a number for {key!r}", shown(text))
     return number
+
+
+def _negate(path: Path, text: Any) -> bool:
+    if not isinstance(text, str) or text.lower() not in NEGATE:
+        raise FileFormatError(path, "negate 0 or 1", shown(text))
+    return NEGATE[text.lower()]
 
 
 def _origin(path: Path, value: Any) -> tuple[float, float]:
     if not (isinstance(value, list) and len(value) == 3):
-        raise FileFormatError(path, "an origin of [x, y, yaw]", repr(value))
-    x, y, yaw = (_number(path, {"origin": part}, "origin") for part in value)
-    if yaw != 0:
+        raise FileFormatError(path, "an origin of [x, y, yaw]", shown(value))
+    x, y, yaw = (_number(path, part, "origin") for part in value)
+    if abs(math.remainder(yaw, math.tau)) > MOST_TURN:
         raise FileFormatError(path, "an origin of yaw 0", f"{yaw:g}", hint="Turn the image.")
     return x, y
-
-
-def _read_darkness(path: Path, name: Any, *, negate: bool) -> Floats:
-    """Return how dark the image is that a map names, from 0 (white, black if negated) to 1."""
-    if not isinstance(name, str):
-        raise FileFormatError(path, "the name of an image", repr(name))
-    file = path.parent / name
-    try:
-        with Image.open(file) as image:
-            deep = image.mode.startswith("I")  # 16 bits, of one channel
-            channels = "RGBA" if image.has_transparency_data else "RGB"
-            pixels = np.atleast_3d(np.asarray(image if deep else image.convert(channels)))
-    except FileNotFoundError as error:
-        raise FileFormatError(file, f"the image of {path.name}", "no such file") from error
-    except (OSError, ValueError, Image.DecompressionBombError) as error:
-        raise FileFormatError(file, "an image", str(error)) from error
-    # In whole numbers up to the quotient: grey 205 is the float nearest to 50 / 255, and a
-    # threshold that says the same is met exactly.
-    white = (65535 if deep else 255) * pixels.shape[-1]
-    grey = pixels.sum(axis=-1, dtype=np.int64)
-    darkness: Floats = (grey if negate else white - grey) / white
-    return darkness

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from groundmap.camera import StereoRig
+from groundmap.documents import read_toml
 from groundmap.errors import FileFormatError, InputError
 from groundmap.frames import World
 
@@ -25,7 +25,7 @@ def read_rig(path: Path) -> tuple[StereoRig, World]:
         No TOML; a key that is missing or unknown (the nearest one is named); a value that no rig
         can have.
     """
-    values = _read_toml(path)
+    values = read_toml(path)
     _check_keys(path, values)
     world = values.pop("world")
     if world not in WORLDS:
@@ -57,16 +57,6 @@ def write_rig(path: Path, rig: StereoRig, world: World) -> None:
     # Python writes floats, and lists of them, the way TOML does.
     lines = [f'world = "{world}"', *(f"{key} = {value}" for key, value in rig_values(rig).items())]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def _read_toml(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_bytes().decode("utf-8"))
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise FileFormatError(path, "a readable file", reason) from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise FileFormatError(path, "TOML", f"something else ({error})") from error
 
 
 def _check_keys(path: Path, values: dict[str, Any]) -> None:

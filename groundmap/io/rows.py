@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from groundmap.arrays import Ints
 from groundmap.errors import FileFormatError
+from groundmap.files import open_text, reason_of
 
 CHUNK_LINES = 65_536
 SHOWN_CHARACTERS = 60
@@ -48,12 +49,11 @@ def opened(path: str | PathLike[str]) -> Iterator[TextIO]:
     FileFormatError
         There is no such file, or it can't be read.
     """
-    try:
-        with open(path, encoding="utf-8-sig", errors="replace") as stream:
+    with open_text(path) as stream:
+        try:
             yield stream
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise FileFormatError(path, "a readable file", reason) from error
+        except OSError as error:
+            raise FileFormatError(path, "a readable file", reason_of(error)) from error
 
 
 def read_rows(

@@ -9,7 +9,10 @@ import numpy.typing as npt
 from pydantic import Field
 
 from groundmap.arrays import Floats, as_floats, check_finite
+from groundmap.errors import InputError
 from groundmap.settings import Settings
+
+MOST_VIEWS = 100_000
 
 
 class DriveSettings(Settings):
@@ -74,7 +77,15 @@ def _along(settings: DriveSettings) -> Floats:
     moves = np.diff(stops, axis=0)
     lengths = np.hypot(moves[:, 0], moves[:, 1]) / settings.every
     turns = np.abs(moves[:, 2]) / settings.every_turn
-    counts = np.maximum(np.ceil(np.maximum(lengths, turns)).astype(int), 1)
+    steps_needed = np.maximum(np.ceil(np.maximum(lengths, turns)), 1.0)
+    if steps_needed.sum() > MOST_VIEWS:
+        raise InputError(
+            "stops",
+            f"a drive of {MOST_VIEWS} views at most",
+            f"{steps_needed.sum():.3g}",
+            hint="Take stops nearer to each other, or larger every [m] and every_turn [rad].",
+        )
+    counts = steps_needed.astype(int)
     steps = [
         stop + np.outer(np.arange(count) / count, move)
         for stop, count, move in zip(stops[:-1], counts, moves, strict=True)

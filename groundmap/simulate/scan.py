@@ -9,6 +9,7 @@ import shapely
 from pydantic import Field
 
 from groundmap.arrays import Floats
+from groundmap.errors import InputError
 from groundmap.features import Features, View
 from groundmap.frames import invert
 from groundmap.kernels.occlusion import first_hits
@@ -19,6 +20,7 @@ from groundmap.simulate.sensor import SensorSettings
 from groundmap.simulate.truth import in_images, seen_along_ground
 from groundmap.simulate.world import World
 
+MOST = 5e6  # features of a view
 SIGMA = 1e-6  # [m], of every feature
 
 
@@ -53,6 +55,8 @@ def scan(
     """
     heights = mapper.step_height, mapper.robot_height
     xmin, ymin, xmax, ymax = world.bounds
+    _check_number((xmax - xmin) / settings.ground * (ymax - ymin) / settings.ground, "ground")
+    _check_number(360.0 / settings.bearing, "bearing")
     lattice = np.stack(
         np.meshgrid(np.arange(xmin, xmax, settings.ground), np.arange(ymin, ymax, settings.ground)),
         axis=-1,
@@ -78,6 +82,16 @@ def scan(
             rig=sensor.rig,
             points=Features.points(points, covariance),
             timestamp=float(time),
+        )
+
+
+def _check_number(features: float, name: str) -> None:
+    if features > MOST:
+        raise InputError(
+            f"scan.{name}",
+            f"{MOST:g} features at most",
+            f"{features:.3g}",
+            hint="Give a larger step, or smaller bounds of the world [m].",
         )
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import typer
 
+from groundmap.documents import WrongDocumentError, parse_json
 from planners.console import numbers
 
 
@@ -56,8 +56,8 @@ def assignments(texts: list[str]) -> dict[str, Any]:
 def _listed(text: str) -> Any:
     """Return a list, as JSON has it."""
     try:
-        return json.loads(text)
-    except json.JSONDecodeError as error:
+        return parse_json(text)
+    except WrongDocumentError as error:
         raise typer.BadParameter(
             f"expected a list such as [[1, 2], [3, 4]], got {text!r}", param_hint="--set"
         ) from error

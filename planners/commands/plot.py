@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from itertools import islice
 from pathlib import Path
@@ -13,7 +12,8 @@ import numpy.typing as npt
 import typer
 
 from groundmap import ConfidenceGrid, GroundMapper, draw, fit_ground, read_views
-from groundmap.arrays import Floats, as_floats
+from groundmap.arrays import Floats, as_floats, check_finite
+from groundmap.documents import read_json
 from groundmap.errors import FileFormatError, InputError
 from groundmap.io import files_of, load_map
 from planners.commands.settings_file import ConfigOption, read_settings
@@ -128,10 +128,15 @@ def _draw_view(
 
 def _read_route(path: Path) -> Floats:
     """Read the line of a GeoJSON Feature."""
+    expected = "a GeoJSON Feature with a LineString"
+    feature = read_json(path, "a GeoJSON file")
     try:
-        feature = json.loads(path.read_text())
-        return as_floats("coordinates", feature["geometry"]["coordinates"], (None, 2))
-    except FileNotFoundError as error:
-        raise FileFormatError(path, "a GeoJSON file", "no file of that name") from error
-    except (KeyError, TypeError, ValueError) as error:
-        raise FileFormatError(path, "a GeoJSON Feature with a LineString", str(error)) from error
+        line = as_floats("coordinates", feature["geometry"]["coordinates"], (None, 2))
+        check_finite("coordinates", line)
+    except InputError as error:
+        raise FileFormatError(path, f"{expected} of {error.expected}", error.got) from error
+    except (KeyError, TypeError) as error:
+        raise FileFormatError(path, expected, "something else") from error
+    if not len(line):
+        raise FileFormatError(path, expected, "one without coordinates")
+    return line

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from groundmap.errors import FileFormatError, SettingsError
+from groundmap.documents import read_toml
+from groundmap.errors import SettingsError
 from groundmap.settings import GroundSettings, MapperSettings
 
 TABLES = {"mapper": MapperSettings, "ground": GroundSettings}
@@ -32,12 +32,7 @@ def read_settings(path: Path | None) -> dict[str, dict[str, Any]]:
     tables: dict[str, dict[str, Any]] = {name: {} for name in TABLES}
     if path is None:
         return tables
-    try:
-        content = tomllib.loads(path.read_text())
-    except FileNotFoundError as error:
-        raise FileFormatError(path, "a settings file", "no file of that name") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, IsADirectoryError) as error:
-        raise FileFormatError(path, "a TOML file", str(error)) from error
+    content = read_toml(path, "a settings file")
     for name, table in content.items():
         if name not in TABLES or not isinstance(table, dict):
             raise SettingsError(name, "a table, [mapper] or [ground]", "another key")

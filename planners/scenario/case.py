@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 from pydantic import Field
 
+from groundmap.documents import read_toml
 from groundmap.errors import FileFormatError, InputError
 from groundmap.settings import GroundSettings, MapperSettings, Settings
 from groundmap.simulate.drive import DriveSettings
@@ -83,7 +83,7 @@ def load_scenario(path: Path) -> Scenario:
         it lacks, or a value out of its range; a bound in ``[bounds]`` on a figure that a query
         holds itself. Neither replaces the other: state each figure's bound in one place.
     """
-    content = _read(path)
+    content = read_toml(path, "a scenario file")
     try:
         return _scenario(path, content)
     except FileFormatError:
@@ -92,15 +92,6 @@ def load_scenario(path: Path) -> Scenario:
         raise FileFormatError(
             path, f"{error.name} to be {error.expected}", error.got, hint=error.hint
         ) from error
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise FileFormatError(path, "a scenario file", "no file of that name") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise FileFormatError(path, "a TOML file", str(error)) from error
 
 
 class ScenarioSettings(Settings):

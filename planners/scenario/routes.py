@@ -9,6 +9,7 @@ import shapely
 
 from groundmap import ConfidenceGrid
 from groundmap.arrays import Floats
+from groundmap.errors import InputError
 from groundmap.simulate.truth import touched_cells
 from planners.errors import PlanningError
 from planners.problem import PlanningProblem
@@ -18,6 +19,7 @@ from planners.scenario.queries import OUTCOME, QuerySettings
 from planners.scenario.simulated import Simulated
 
 FINE = 0.05  # [m], cells of the true world's map
+MOST_CELLS = 5e7  # of it
 # Of the best route.
 IN_TRUTH: dict[str, Any] = {
     "planner": "astar",
@@ -88,7 +90,15 @@ def true_map(simulated: Simulated) -> ConfidenceGrid:
     """Return the true world as a map of fine cells, free wherever no obstacle is."""
     window = simulated.window
     grid = ConfidenceGrid(resolution=FINE)
-    rows, cols = np.ceil(np.array(window.count.shape) * window.resolution / FINE).astype(int)
+    sides = np.ceil(np.array(window.count.shape) * window.resolution / FINE)
+    if sides.prod() > MOST_CELLS:
+        raise InputError(
+            "world",
+            f"{MOST_CELLS:g} cells of {FINE} m at most, to compare routes with",
+            f"{sides.prod():.3g}",
+            hint="Give smaller bounds [m].",
+        )
+    rows, cols = sides.astype(int)
     lower = np.floor(window.origin / FINE).astype(np.int64)[::-1]
     origin = lower[::-1].astype(np.float64) * FINE
     nonfree = touched_cells(simulated.truth.obstacles, origin, FINE, (int(rows), int(cols)))

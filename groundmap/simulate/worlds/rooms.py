@@ -34,8 +34,8 @@ class Rooms(BuiltWorld):
     (0.0, 0.0, 12.8, 5.4)
     """
 
-    columns: int = Field(3, ge=1, description="rooms along x [rooms]")
-    rows: int = Field(2, ge=1, description="rooms along y [rooms]")
+    columns: int = Field(3, ge=1, le=100, description="rooms along x [rooms]")
+    rows: int = Field(2, ge=1, le=100, description="rooms along y [rooms]")
     room_width: float = Field(5.0, gt=0, description="clear size of a room along x [m]")
     room_depth: float = Field(4.0, gt=0, description="clear size of a room along y [m]")
     wall_thickness: float = Field(0.2, gt=0, description="of every wall [m]")
@@ -45,7 +45,7 @@ class Rooms(BuiltWorld):
     loops: float = Field(
         0.2, ge=0, le=1, description="share of the other walls that have a door as well"
     )
-    boxes: int = Field(4, ge=0, description="boxes in a room, at most [boxes]")
+    boxes: int = Field(4, ge=0, le=1000, description="boxes in a room, at most [boxes]")
 
     def check(self) -> None:
         """Refuse walls shorter than their doors, and ways wider than them."""

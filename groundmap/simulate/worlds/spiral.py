@@ -25,7 +25,7 @@ class Spiral(BuiltWorld):
 
     corridor_width: float = Field(2.0, gt=0, description="between the walls [m]")
     wall_thickness: float = Field(0.2, gt=0, description="of every wall [m]")
-    turns: int = Field(2, ge=1, description="times around [turns]")
+    turns: int = Field(2, ge=1, le=1000, description="times around [turns]")
     height: float = Field(2.5, gt=0, description="of every wall [m]")
 
     def centre_line(self) -> shapely.LineString:
