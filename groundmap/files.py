@@ -26,7 +26,7 @@ def open_file(path: str | PathLike[str], expected: str = "a readable file") -> B
         A name that no file can have, or a file that is missing, is a folder or can't be read.
     """
     try:
-        stream = open(path, "rb")
+        stream = open(path, "rb")  # noqa: SIM115  # the caller closes it
         if stat.S_ISDIR(os.fstat(stream.fileno()).st_mode):  # some systems open folders, too
             stream.close()
             raise IsADirectoryError

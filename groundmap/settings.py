@@ -10,6 +10,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from groundmap.errors import SettingsError
 from groundmap.printable import shown
 
+MOST_CELLS_OF_RANGE = 4000  # a view's block then has 64 million cells
+
 
 class Settings(BaseModel):
     """Base of every settings class, in both packages.
@@ -68,7 +70,13 @@ def _nearest(key: str, known: list[str]) -> str:
 
 
 class MapperSettings(Settings):
-    """All that `groundmap.GroundMapper` can be told; lengths in metres, angles in radians."""
+    """All that `groundmap.GroundMapper` can be told; lengths in metres, angles in radians.
+
+    Raises
+    ------
+    SettingsError
+        Besides unknown keys and values out of range: a range of more than 4,000 cells.
+    """
 
     resolution: float = Field(0.1524, gt=0, le=1000, description="size of a cell [m]; 6 inches")
     mode: Literal["2d"] = Field("2d", description="ground plane (2d)")
@@ -119,6 +127,14 @@ class MapperSettings(Settings):
         """Refuse ranges and heights out of order."""
         self.check_order("min_range", "max_range")
         self.check_order("step_height", "robot_height")
+        if self.max_range > MOST_CELLS_OF_RANGE * self.resolution:
+            raise SettingsError(
+                "resolution",
+                f"{self.max_range / MOST_CELLS_OF_RANGE:g} or more, for max_range "
+                f"{self.max_range:g}",
+                f"{self.resolution:g}",
+                hint="A view takes memory and time with the square of max_range / resolution.",
+            )
 
 
 class GroundSettings(Settings):

@@ -1,85 +1,27 @@
-"""From A to B on a confidence grid: routes, or reasons why there is none."""
+"""From A to B on a confidence grid: routes, or reasons why there is none.
 
-from planners.ara import ARASettings
-from planners.astar import AStarSettings, DijkstraSettings, WeightedAStarSettings
-from planners.auto import AutoSettings
-from planners.costs import CostSettings
-from planners.dstar_lite import DStarLiteSettings
-from planners.enclosure import widest_route
-from planners.engine import Improvement
-from planners.errors import (
-    AuditError,
-    CancelledError,
-    EnclosedError,
-    NonFreeError,
-    NoRouteError,
-    OutsideMapError,
-    PlanningError,
-    ProblemError,
-    SmoothingError,
-    TimeLimitError,
-    UnknownSpaceError,
-    UnsolvedError,
-)
-from planners.fields import distance_field, reachable
-from planners.footprint import Footprint
-from planners.hybrid import HybridAStarSettings
-from planners.incremental import IncrementalPlanner
-from planners.jps import JPSPlusSettings, JPSSettings
-from planners.many import plan_many
-from planners.polyanya import PolyanyaSettings
-from planners.problem import PlanningProblem
-from planners.registry import OWN_PLANNERS, PLANNERS, plan
-from planners.route import Route
-from planners.sampling.roadmap import Roadmap
-from planners.sampling.settings import SamplingSettings
-from planners.shortcuts import shortcut
-from planners.smoother import max_curvature, smooth
-from planners.theta import LazyThetaSettings, ThetaSettings
-from planners.widest import WidestRoute
+The names are those of `planners.public`, which is loaded when the first is asked for: the command
+line handles Ctrl-C before that, as loading takes a second. No module of the package may be called
+like one of them, since Python would then show the module instead.
+"""
 
-__all__ = [
-    "ARASettings",
-    "AStarSettings",
-    "AuditError",
-    "AutoSettings",
-    "CancelledError",
-    "CostSettings",
-    "DStarLiteSettings",
-    "DijkstraSettings",
-    "EnclosedError",
-    "Footprint",
-    "HybridAStarSettings",
-    "Improvement",
-    "IncrementalPlanner",
-    "JPSPlusSettings",
-    "JPSSettings",
-    "LazyThetaSettings",
-    "NoRouteError",
-    "NonFreeError",
-    "OWN_PLANNERS",
-    "OutsideMapError",
-    "PLANNERS",
-    "PlanningError",
-    "PlanningProblem",
-    "PolyanyaSettings",
-    "ProblemError",
-    "Roadmap",
-    "Route",
-    "SamplingSettings",
-    "SmoothingError",
-    "ThetaSettings",
-    "TimeLimitError",
-    "UnknownSpaceError",
-    "UnsolvedError",
-    "WeightedAStarSettings",
-    "WidestRoute",
-    "distance_field",
-    "max_curvature",
-    "plan",
-    "plan_many",
-    "reachable",
-    "shortcut",
-    "smooth",
-    "widest_route",
-]
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from planners.public import *  # noqa: F403  # what `__getattr__` returns
+    from planners.public import __all__ as __all__
+
+
+def __getattr__(name: str) -> Any:
+    if name.startswith("_") and name != "__all__":  # what Python and its tools look for
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    public = import_module("planners.public")
+    if name != "__all__" and name not in public.__all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(public, name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return [*globals(), *import_module("planners.public").__all__]

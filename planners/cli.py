@@ -1,92 +1,101 @@
-"""The command ``groundmap``: exit 0 done, 1 a bound missed, 2 bad input or usage, 3 no route."""
+"""The command ``groundmap``: exit 0 done, 1 a bound missed, 2 bad input or usage, 3 no route.
+
+130 and 143 after SIGINT (Ctrl-C) and SIGTERM: one line on stderr, at any time, and no process is
+left behind. What takes time to load is loaded after their handlers are set.
+"""
 
 from __future__ import annotations
 
-import json
+import os
+import signal
 import sys
+import threading
 from collections.abc import Sequence
-from importlib.metadata import version
-from typing import Annotated
+from types import FrameType
+from typing import Any
 
-import typer
-from typer.exceptions import TyperException
-
-from groundmap.errors import GroundmapError
-from planners.commands.bench import bench_app
-from planners.commands.convert import convert_command
-from planners.commands.demo import demo_command
-from planners.commands.evaluate import evaluate_command
-from planners.commands.info import info_command
-from planners.commands.map import map_command
-from planners.commands.plan import plan_command
-from planners.commands.plot import plot_command
-from planners.commands.scenario import scenario_app
-from planners.console import say
-from planners.errors import AuditError, NoRouteError, PlanningError
-
-DONE, MISSED, BAD_INPUT, NO_ROUTE, INTERRUPTED = 0, 1, 2, 3, 130
-
-app = typer.Typer(
-    name="groundmap",
-    add_completion=False,
-    rich_markup_mode=None,  # it would take the units, such as [m], for markup
-    pretty_exceptions_enable=False,
-)
+WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 
 
-def _print_version(asked: bool) -> None:
-    if asked:
-        print(f"groundmap {version('groundmap')}")
-        raise typer.Exit
+class _Interrupts:
+    """What happens on SIGINT and SIGTERM.
 
+    While a command runs, the first raises KeyboardInterrupt, so that files which are half written
+    are removed. Before and after, and at the second, the process ends at once.
+    """
 
-@app.callback()
-def _root(
-    _: Annotated[
-        bool,
-        typer.Option(
-            "--version", callback=_print_version, is_eager=True, help="Print the version."
-        ),
-    ] = False,
-) -> None:
-    """From sparse stereo features to a map one can plan on. Metres, radians, seconds."""
+    def __init__(self) -> None:
+        self.running = False
+        self.received = 0  #: number of the signal; 0 for none
+        self._before: dict[int, Any] = {}
 
+    def set_handlers(self) -> None:
+        """Handle the signals, but for those that the caller wants ignored (as nohup does)."""
+        if threading.current_thread() is not threading.main_thread():
+            return
+        for number in WORDS:
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                self._before[number] = signal.signal(number, self._handle)
+        sys.unraisablehook = self._unraisable
 
-app.command("demo")(demo_command)
-app.command("map")(map_command)
-app.command("plan")(plan_command)
-app.command("plot")(plot_command)
-app.command("info")(info_command)
-app.command("convert")(convert_command)
-app.command("evaluate")(evaluate_command)
-app.add_typer(scenario_app)
-app.add_typer(bench_app)
+    def restore_handlers(self) -> None:
+        """Have the signals handled as before."""
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+        sys.unraisablehook = sys.__unraisablehook__
+
+    def leave(self) -> None:
+        """End the process and those that it started, with a line on stderr."""
+        if "multiprocessing" in sys.modules:
+            for child in sys.modules["multiprocessing"].active_children():
+                child.kill()
+        number = signal.Signals(self.received)
+        os.write(2, f"groundmap: {WORDS[number]}\n".encode())
+        os._exit(128 + number)
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        first, self.received = not self.received, number
+        if not (self.running and first):
+            self.leave()
+        raise KeyboardInterrupt
+
+    def _unraisable(self, unraisable: Any) -> None:
+        """Leave where an interrupt is raised in what can't raise, such as a destructor."""
+        if self.received and unraisable.exc_type is KeyboardInterrupt:
+            self.leave()
+        sys.__unraisablehook__(unraisable)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command and exit: one sentence on stderr where something is wrong."""
-    argv = list(sys.argv[1:] if arguments is None else arguments)
+    """Run the command and exit.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        The process's own unless given. With arguments, the signals are handled as before once
+        the command has ended.
+    """
+    interrupts = _Interrupts()
+    interrupts.set_handlers()
     try:
-        code = app(argv or ["--help"], standalone_mode=False) or DONE
-        if code == INTERRUPTED:  # typer has turned the key into an exit code
-            say("groundmap: interrupted")
-    except NoRouteError as error:
-        code = _refuse(error, str(error), NO_ROUTE, argv)
-    except AuditError as error:
-        code = _refuse(error, f"{error} This is a bug: please report it.", MISSED, argv)
-    except (GroundmapError, PlanningError, OSError) as error:
-        code = _refuse(error, str(error), BAD_INPUT, argv)
-    except TyperException as error:
-        code = _refuse(error, error.format_message(), BAD_INPUT, argv)
-    except (KeyboardInterrupt, typer.Abort):
-        say("groundmap: interrupted")
-        code = INTERRUPTED
+        code = _run(interrupts, sys.argv[1:] if arguments is None else arguments)
+    finally:
+        if arguments is not None:
+            interrupts.restore_handlers()
     sys.exit(code)
 
 
-def _refuse(error: Exception, reason: str, code: int, argv: Sequence[str]) -> int:
-    """Say why, in a sentence on stderr, and as JSON on stdout where that was asked for."""
-    say(f"groundmap: {reason}")
-    if "--json" in argv:
-        print(json.dumps({"error": type(error).__name__, "reason": reason}))
-    return code
+def _run(interrupts: _Interrupts, argv: Sequence[str]) -> int:
+    from planners.commands.app import run
+
+    try:
+        interrupts.running = True
+        return run(list(argv))
+    except KeyboardInterrupt:
+        interrupts.received = interrupts.received or signal.SIGINT
+        raise
+    finally:
+        interrupts.running = False
+        # Whatever came out of the command then: libraries turn interrupts into other exceptions.
+        if interrupts.received:
+            interrupts.leave()

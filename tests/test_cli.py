@@ -14,7 +14,7 @@ import pytest
 
 from command_line import Ran, run, run_process
 from groundmap import CellState, ConfidenceGrid, read_views, write_views
-from planners.cli import app
+from planners.commands.app import app
 
 VIEWS = 12
 # The plain square below: 32 x 32 m, a ring of walls in it, and a strip that nobody saw.

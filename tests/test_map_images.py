@@ -163,7 +163,10 @@ def test_a_value_that_cannot_be_is_refused(
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("image: [\n", r"expected YAML, got something else \(expected the node content, .*\) at line 2"),
+        (
+            "image: [\n",
+            r"expected YAML, got something else \(expected the node content, .*\) at line 2",
+        ),
         ("image: a\x00b\n", "expected YAML, got something else"),
         ("", "expected keys and values, got an empty file"),
         ("- image\n", "expected keys and values, got a list"),

@@ -13,7 +13,7 @@ import pytest
 
 from groundmap import fit_ground, read_views
 from planners import OWN_PLANNERS
-from planners.cli import app
+from planners.commands.app import app
 from planners.sampling.door import samplers
 
 README = Path(__file__).parents[1] / "README.md"

@@ -1,6 +1,6 @@
 """Files: logs of views and maps in, logs of views and maps for other programs out."""
 
-from groundmap.io.export import EXPORTERS, export
+from groundmap.io.export import EXPORTERS, export, files_written
 from groundmap.io.folder_writer import write_views
 from groundmap.io.formats import FORMATS, read_views
 from groundmap.io.load import LOADERS, files_of, load_map
@@ -14,6 +14,7 @@ __all__ = [
     "ViewLog",
     "export",
     "files_of",
+    "files_written",
     "grid_of",
     "load_map",
     "read_views",

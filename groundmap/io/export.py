@@ -33,6 +33,27 @@ EXPORTERS: dict[str, Exporter] = {
 }
 
 
+def files_written(path: str | PathLike[str]) -> list[Path]:
+    """Return the files that `export` writes: the one named, and the image beside a ``.yaml``.
+
+    Raises
+    ------
+    InputError
+        Another suffix than those of `EXPORTERS`.
+
+    Examples
+    --------
+    >>> [file.name for file in files_written("maps/depot.yaml")]
+    ['depot.yaml', 'depot.pgm']
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in EXPORTERS:
+        known = " or ".join(EXPORTERS)
+        raise InputError("path", f"a file that ends in {known}", repr(path.name))
+    return [path, path.with_suffix(".pgm")] if suffix == ".yaml" else [path]
+
+
 def export(
     grid: ConfidenceGrid, path: str | PathLike[str], *, bounds: npt.ArrayLike | None = None
 ) -> None:
@@ -60,8 +81,5 @@ def export(
         ...
     groundmap.errors.InputError: path: expected a file that ends in .npz or .yaml, got 'map.png'.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix not in EXPORTERS:
-        known = " or ".join(EXPORTERS)
-        raise InputError("path", f"a file that ends in {known}", repr(Path(path).name))
-    EXPORTERS[suffix](grid, path, bounds=bounds)
+    files_written(path)
+    EXPORTERS[Path(path).suffix.lower()](grid, path, bounds=bounds)

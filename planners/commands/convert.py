@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from groundmap.archive import check_writable
-from groundmap.io import export, files_of, load_map
+from groundmap.io import export, files_of, files_written, load_map
 from planners.console import JsonOption, emit, numbers
 
 
@@ -30,7 +30,9 @@ def convert_command(
     as_json: JsonOption = False,
 ) -> None:
     """Write a map in another program's form."""
-    check_writable(out, sources=files_of(map_file))
+    sources = files_of(map_file)
+    for file in files_written(out):
+        check_writable(file, sources=sources)
     box = None if bounds is None else numbers("bounds", bounds, 4, 6)
     export(load_map(map_file), out, bounds=box)
     emit({"out": str(out)}, as_json=as_json, title=f"converted {map_file}")

@@ -30,10 +30,11 @@ def demo_command(
     as_json: JsonOption = False,
 ) -> None:
     """Map a log that comes along, plan a route on the map, draw both."""
-    _make_folder(out)
+    _check_folder(out)
     mapper = map_courtyard()
     start = mapper.grid.trajectory[0, :2]
     route = plan(PlanningProblem(mapper.grid, start=start, goal=GOAL, footprint=FOOTPRINT))
+    out.mkdir(exist_ok=True)
     mapper.grid.save(out / MAP)
     route.save_geojson(out / ROUTE)
     draw_map(mapper.grid, out / PICTURE, waypoints=route.waypoints, footprint=FOOTPRINT)
@@ -56,12 +57,13 @@ def map_courtyard() -> GroundMapper:
     return mapper
 
 
-def _make_folder(out: Path) -> None:
+def _check_folder(out: Path) -> None:
+    """Check that the files can be written, the folder made where there is none."""
     if out.is_file():
         raise FileFormatError(out, "a folder, or the name of a new one", "a file")
     if not out.is_dir():
         check_writable(out)
-        out.mkdir()
+        return
     for name in (MAP, ROUTE, PICTURE):
         check_writable(out / name)
 

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from contextlib import closing
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from groundmap.archive import check_writable
+from groundmap.errors import GroundmapError
 from groundmap.simulate.worlds import GENERATORS
+from planners.bench.crew import crew
 from planners.console import JsonOption, emit, watched
+from planners.errors import PlanningError
 from planners.scenario.case import find_scenarios, load_scenario
 from planners.scenario.outcome import Outcome
 from planners.scenario.report import write_report
@@ -90,10 +93,23 @@ def _run(paths: list[Path], jobs: int) -> Iterator[tuple[Path, Outcome]]:
         for path in paths:
             yield path, run_scenario(path)
         return
-    with ProcessPoolExecutor(min(jobs, len(paths)), mp_context=get_context("spawn")) as pool:
-        running = {pool.submit(run_scenario, path): path for path in paths}
-        try:
-            for done in as_completed(running):
-                yield running[done], done.result()
-        finally:
-            pool.shutdown(cancel_futures=True)
+    workers = crew(paths, _outcome, jobs=min(jobs, len(paths)), patience=math.inf, lost=_lost)
+    with closing(workers):
+        for path, outcome in workers:
+            if not isinstance(outcome, Outcome):
+                raise outcome
+            yield path, outcome
+
+
+def _outcome(path: Path) -> Outcome | GroundmapError | PlanningError | OSError:
+    """Return what a scenario gives, or what it raises: a worker's exceptions stay with it."""
+    try:
+        return run_scenario(path)
+    except (GroundmapError, PlanningError, OSError) as error:
+        return error
+
+
+def _lost(path: Path, reason: str) -> Outcome:
+    """Return the outcome of a scenario whose process ended."""
+    scenario = load_scenario(path)
+    return Outcome(scenario.name, scenario.why, passed=False, missed=(reason,))

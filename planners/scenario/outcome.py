@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass, field
 from typing import Any
+
+from planners.scenario.patterns import is_found
 
 REASON = "reason"  # figure of a query that an error answers: its sentence
 Figure = float | int | str | None  # None: there was nothing to measure
@@ -25,7 +26,7 @@ class Bound:
         if self.equals is not None:
             return value == self.equals
         if self.matches is not None:
-            return isinstance(value, str) and re.search(self.matches, value) is not None
+            return isinstance(value, str) and is_found(self.matches, value)
         if value is None or isinstance(value, str) or math.isnan(value):
             return False
         return (self.min is None or value >= self.min) and (self.max is None or value <= self.max)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import Any, Literal
 
@@ -15,6 +14,7 @@ from planners.footprint import Footprint
 from planners.problem import Unknown
 from planners.registry import PLANNERS
 from planners.scenario.outcome import REASON, Bound
+from planners.scenario.patterns import check_pattern
 
 OUTCOME = "route"  # what is expected where no error is
 # Where a query states the bounds of its figures.
@@ -93,11 +93,7 @@ def check_query(query: QuerySettings) -> None:
         raise InputError(f"queries.{error.name}", error.expected, error.got) from error
     if query.reason is not None and query.expect == "route":
         raise InputError("queries.reason", "none where a route is expected", repr(query.reason))
-    try:
-        re.compile(query.reason or "")
-    except re.error as error:
-        expected = f"a regular expression ({error})"
-        raise InputError("queries.reason", expected, repr(query.reason)) from error
+    check_pattern("queries.reason", query.reason or "")
 
 
 def bounds_of(query: QuerySettings, *, known_world: bool) -> dict[str, Bound]:

@@ -31,7 +31,9 @@ class Corridor(BuiltWorld):
     niches: int = Field(6, ge=0, le=1000, description="recesses in outer walls and core [niches]")
     niche_width: float = Field(1.2, gt=0, description="of each niche, along the wall [m]")
     niche_depth: float = Field(0.5, gt=0, description="of each niche [m]")
-    pillars: int = Field(8, ge=0, le=1000, description="pilasters on outer walls and core [pillars]")
+    pillars: int = Field(
+        8, ge=0, le=1000, description="pilasters on outer walls and core [pillars]"
+    )
     pillar_size: float = Field(0.4, gt=0, description="side of a pilaster's square [m]")
 
     def check(self) -> None:

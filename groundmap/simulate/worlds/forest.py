@@ -33,7 +33,9 @@ class Forest(BuiltWorld):
     bounds: Box = Field(
         (-12.0, -12.0, 12.0, 12.0), description="xmin, ymin, xmax, ymax of the forest [m]"
     )
-    trees: int = Field(80, ge=0, le=10_000, description="trees, as far as there is room for them [trees]")
+    trees: int = Field(
+        80, ge=0, le=10_000, description="trees, as far as there is room for them [trees]"
+    )
     min_radius: float = Field(0.05, gt=0, description="of the thinnest trunk [m]")
     max_radius: float = Field(0.25, gt=0, description="of the thickest trunk [m]")
     spacing: float = Field(1.2, gt=0, description="least gap between two trunks [m]")

@@ -35,11 +35,11 @@ class Parking(BuiltWorld):
     False
     """
 
-    length: float = Field(60.0, gt=0, description="of the street [m]")
+    length: float = Field(60.0, gt=0, le=10_000, description="of the street [m]")
     road_width: float = Field(5.0, gt=0, description="free road between the parked cars [m]")
     pavement: float = Field(2.0, gt=0, description="width of the pavement on each side [m]")
     occupancy: float = Field(0.75, ge=0, le=1, description="share of the places that are taken")
-    pole_spacing: float = Field(12.0, gt=0, description="between lamp posts, on average [m]")
+    pole_spacing: float = Field(12.0, ge=0.1, description="between lamp posts, on average [m]")
     pole_radius: float = Field(0.08, gt=0, description="of a lamp post [m]")
     pole_height: float = Field(4.0, gt=0, description="of a lamp post [m]")
     height: float = Field(6.0, gt=0, description="of the fronts of the houses [m]")

@@ -29,14 +29,18 @@ class Warehouse(BuiltWorld):
     """
 
     racks: int = Field(4, ge=1, le=100, description="racks beside one another, along y [racks]")
-    blocks: int = Field(2, ge=1, le=100, description="the same behind one another, along x [blocks]")
+    blocks: int = Field(
+        2, ge=1, le=100, description="the same behind one another, along x [blocks]"
+    )
     rack_length: float = Field(10.0, gt=0, description="along x [m]")
     rack_depth: float = Field(1.0, gt=0, description="along y [m]")
     rack_height: float = Field(2.2, gt=0, description="top of a rack [m]")
     bay: float = Field(1.25, ge=0, description="spacing of the racks' uprights; 0: no pattern [m]")
     aisle_width: float = Field(2.5, gt=0, description="between racks [m]")
     cross_aisle: float = Field(3.0, gt=0, description="width of the cross aisles [m]")
-    pallets: int = Field(6, ge=0, le=10_000, description="pallets that stand in the aisles [pallets]")
+    pallets: int = Field(
+        6, ge=0, le=10_000, description="pallets that stand in the aisles [pallets]"
+    )
     wall_thickness: float = Field(0.2, gt=0, description="of the hall's walls [m]")
     height: float = Field(4.0, gt=0, description="of the hall's walls [m]")
 

@@ -1,0 +1,59 @@
+"""Patterns that scenario files hold: compiled and searched for with bounds on size and time."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import warnings
+from functools import cache
+
+from groundmap.errors import InputError
+from groundmap.printable import shown
+
+MOST_CHARACTERS = 500
+TIME_LIMIT = 5.0  # [s] of a search
+PLAIN = re.compile(r"[^\\.^$*+?{}\[\]|()]*")
+# Nothing interrupts a search in this process: some patterns take longer than the universe is old.
+# The alarm ends it where the process that waits for it was killed.
+SEARCH = """
+import re, signal, sys
+getattr(signal, "alarm", abs)(10)
+sys.exit(0 if re.search(sys.argv[1], sys.argv[2]) else 1)
+"""
+
+
+def check_pattern(name: str, pattern: str) -> None:
+    """Check that a pattern is one.
+
+    Raises
+    ------
+    InputError
+        No regular expression, or one of more than 500 characters.
+    """
+    if len(pattern) > MOST_CHARACTERS:
+        raise InputError(name, f"{MOST_CHARACTERS} characters at most", str(len(pattern)))
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of what a later Python may understand otherwise
+            re.compile(pattern)
+    except (re.error, RecursionError, OverflowError) as error:
+        raise InputError(name, f"a regular expression ({error})", shown(pattern)) from error
+
+
+@cache
+def is_found(pattern: str, text: str) -> bool:
+    r"""Return whether a text holds a pattern; one that isn't found within 5 s is not found.
+
+    Examples
+    --------
+    >>> is_found("fenced in", "the goal is fenced in"), is_found(r"\d m", "3 km")
+    (True, False)
+    """
+    if PLAIN.fullmatch(pattern):
+        return pattern in text
+    search = [sys.executable, "-I", "-S", "-W", "ignore", "-c", SEARCH, pattern, text]
+    try:
+        return subprocess.run(search, check=False, timeout=TIME_LIMIT).returncode == 0
+    except subprocess.TimeoutExpired:
+        return False
