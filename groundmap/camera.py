@@ -13,6 +13,8 @@ from groundmap.arrays import Bools, Floats, as_floats
 from groundmap.errors import CameraError
 from groundmap.frames import check_transform
 
+MOST = 1e9  # of any number of a rig: far beyond all rigs, and its square is a number
+
 
 class Triangulated(NamedTuple):
     """What `StereoRig.triangulate` returns."""
@@ -65,10 +67,12 @@ class StereoRig:
         units = {"fx": "px", "fy": "px", "baseline": "m", "pixel_noise_px": "px"}
         for name, unit in units.items():
             value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise CameraError(name, f"a number above 0 [{unit}]", str(value))
-        if not (np.isfinite(self.cx) and np.isfinite(self.cy)):
-            raise CameraError("cx, cy", "finite numbers [px]", f"{self.cx}, {self.cy}")
+            if not 0 < value < MOST:
+                raise CameraError(name, f"a number above 0 [{unit}], below {MOST:g}", str(value))
+        if not (abs(self.cx) < MOST and abs(self.cy) < MOST):
+            raise CameraError(
+                "cx, cy", f"finite numbers [px], below {MOST:g}", f"{self.cx}, {self.cy}"
+            )
         object.__setattr__(
             self, "T_base_camera", check_transform("T_base_camera", self.T_base_camera)
         )

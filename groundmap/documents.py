@@ -16,6 +16,7 @@ import yaml
 
 from groundmap.errors import FileFormatError
 from groundmap.files import read_file
+from groundmap.printable import is_plain
 
 MOST_BYTES = {"TOML": 2**20, "YAML": 2**16, "JSON": 2**24}
 MOST_VALUES = {"TOML": 10**6, "YAML": 10**5, "JSON": 10**7}  # an alias counts as what it stands for
@@ -170,7 +171,7 @@ def _check_scalar(value: Any) -> None:
         if not -(2**63) <= value < 2**63:
             raise WrongDocumentError("a whole number of more than 64 bits")
     elif isinstance(value, str):
-        if "\0" in value or any("\ud800" <= mark <= "\udfff" for mark in value):
+        if not is_plain(value):
             raise WrongDocumentError("text with NUL or an unpaired surrogate")
     else:
         raise WrongDocumentError(f"a {type(value).__name__}")

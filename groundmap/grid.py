@@ -23,10 +23,12 @@ from groundmap.arrays import (
 from groundmap.errors import FileFormatError, InputError, MergeError
 from groundmap.extents import cells_of_box, check_size, check_whole
 from groundmap.fusion import MOST_VIEWS, Average, UpdateRule, rule_from
+from groundmap.printable import is_plain, shown
 from groundmap.tiles import LAYERS, TILE_SHAPES, Index, Tile, Tiles
 from groundmap.window import CellState, GridWindow, cells_of
 
 FORMAT, VERSION = "groundmap-grid", 1
+SMALLEST, LARGEST, FARTHEST = 1e-9, 1e9, 1e12  # [m] cells and origin; areas are then numbers
 MOST_CELLS = 2**28  # of a dense window: 3 GiB
 
 
@@ -66,14 +68,20 @@ class ConfidenceGrid:
         rule: UpdateRule | None = None,
     ) -> None:
         if not isinstance(frame, str):
-            raise InputError("frame", "a name", repr(frame))
+            raise InputError("frame", "a name", shown(frame))
+        if not is_plain(frame):
+            raise InputError("frame", "a name without NUL and unpaired surrogates", shown(frame))
         if not (is_number(resolution) and resolution > 0):
-            raise InputError("resolution", "a number above 0 [m]", repr(resolution)[:60])
+            raise InputError("resolution", "a number above 0 [m]", shown(resolution))
+        if not SMALLEST <= resolution <= LARGEST:
+            raise InputError("resolution", f"{SMALLEST:g} to {LARGEST:g} m", str(resolution))
         if len(origin) not in TILE_SHAPES:
             raise InputError("origin", "2 or 3 numbers [m]", f"{len(origin)}")
         self.resolution = float(resolution)
         self.origin = as_floats("origin", origin, (len(origin),))
         check_finite("origin", self.origin)
+        if (np.abs(self.origin) > FARTHEST).any():
+            raise InputError("origin", f"numbers up to {FARTHEST:g} m", str(self.origin.tolist()))
         self.frame, self.rule = frame, rule or Average()
         self._tiles = Tiles(len(origin))
         #: Base poses the map was seen from, shape (n, 3): x, y [m], yaw [rad], frame map.

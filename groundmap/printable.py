@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import sys
 
 MOST_OF_A_VALUE = 300  # characters of a value, or of a file's name, in a sentence
 MOST_OF_A_SENTENCE = 3000  # characters; the longest lists of names have some 1,500
 ELLIPSIS = "..."
+UNSTORABLE = re.compile("[\0\ud800-\udfff]")
 
 
 def printable(text: str, *, most: int = MOST_OF_A_SENTENCE, lines: bool = False) -> str:
@@ -55,6 +57,11 @@ def shown(value: object, *, most: int = MOST_OF_A_VALUE) -> str:
     except RecursionError:
         return f"a deeply nested {type(value).__name__}"
     return printable(text, most=most)
+
+
+def is_plain(text: str) -> bool:
+    """Whether a text can be stored anywhere: without NUL and unpaired surrogates."""
+    return not UNSTORABLE.search(text)
 
 
 def _cut(text: str, most: int) -> str:

@@ -26,9 +26,11 @@ Array: TypeAlias = np.ndarray[Any, np.dtype[Any]]
 FORMAT = "test-archive"
 HEADER = {"format": FORMAT, "version": 1, "resolution": 0.1524}
 
+texts = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"))
+numbers = st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False)
 json_values = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(),
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
+    st.none() | st.booleans() | numbers | texts,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(texts, inner, max_size=3),
     max_leaves=5,
 )
 arrays = hnp.arrays(
@@ -54,7 +56,7 @@ GOOD = archive_bytes()
 
 
 @given(
-    st.dictionaries(st.text(), json_values, max_size=3),
+    st.dictionaries(texts, json_values, max_size=3),
     st.dictionaries(st.sampled_from(["a", "b", "tiles"]), arrays, max_size=3),
 )
 def test_header_and_arrays_come_back_bit_for_bit(
@@ -183,7 +185,10 @@ NOT_ARCHIVES: dict[str, Callable[[], bytes]] = {
 def test_a_file_that_is_no_archive_is_refused(tmp_path: Path, what: str) -> None:
     path = tmp_path / "file"
     path.write_bytes(NOT_ARCHIVES[what]())
-    with pytest.raises(FileFormatError, match=f"expected a {FORMAT} file, got something else"):
+    with pytest.raises(
+        FileFormatError,
+        match=f"expected a {FORMAT} file, got (something|another|a member|values of)",
+    ):
         read_archive(path, FORMAT, 1)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import re
 
 import pytest
 from hypothesis import given
@@ -20,7 +21,7 @@ from groundmap.errors import (
 )
 
 SHARED = {errors.FactualError, errors.WrongValueError}  # with the planners' own tree
-words = st.text(min_size=1, max_size=20)
+words = st.text(st.characters(exclude_categories=["C", "Z"]), min_size=1, max_size=20)
 
 
 def test_everything_raised_on_purpose_is_a_groundmap_error() -> None:
@@ -78,3 +79,20 @@ def test_an_error_survives_its_way_out_of_a_worker_process(error: GroundmapError
     assert type(again) is type(error)
     assert str(again) == str(error)
     assert again.__dict__ == error.__dict__
+
+
+@given(st.text(min_size=1))
+def test_a_message_is_printable_whatever_its_facts_are(text: str) -> None:
+    for error in (InputError(text, text, text, where=text, hint=text), MergeError(text)):
+        assert str(error).isprintable()
+
+
+def test_a_message_is_of_a_bounded_length_and_shows_both_ends_of_a_fact() -> None:
+    error = FileFormatError("a" + "x" * 5000 + "b", "c" + "y" * 5000 + "d", "e" + "z" * 5000 + "f")
+    assert re.fullmatch(r"ax+\.\.\.x+b: expected cy+\.\.\.y+d, got ez+\.\.\.z+f\.", str(error))
+    assert len(str(error)) < 2000
+
+
+def test_control_and_bidirectional_characters_are_escaped() -> None:
+    error = FileFormatError("a\x1b[2J\u202e.map", "a map", "none")
+    assert str(error) == r"a\x1b[2J\u202e.map: expected a map, got none."

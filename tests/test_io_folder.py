@@ -178,7 +178,7 @@ def test_xyz_behind_the_camera_is_a_counted_drop(folder: Path) -> None:
         (lambda text: text + "T_base_camera = [[1, 0], [2]]\n", "T_base_camera to be .* got "),
         (lambda text: text + MOUNTED.replace("0.2", "0.2, 3"), "T_base_camera to be .*4, 4"),
         (lambda text: text + MOUNTED.replace("-1", "-2", 1), "T_base_camera .* orthonormal"),
-        (lambda text: text[:-6], "TOML, got something else"),
+        (lambda text: text[:-6], "a TOML file, got something else"),
     ],
 )
 def test_a_bad_rig_is_refused(folder: Path, change: Callable[[str], str], message: str) -> None:
@@ -261,7 +261,9 @@ def test_an_unsorted_view_is_seen_across_chunks(
 @pytest.mark.parametrize("name", ["rig.toml", "poses.txt"])
 def test_a_missing_file_is_named(folder: Path, name: str) -> None:
     (folder / name).unlink()
-    with pytest.raises(FileFormatError, match=f"{name}: expected a readable file, got no such"):
+    with pytest.raises(
+        FileFormatError, match=f"{name}: expected a .*file, got no file of that name"
+    ):
         read_views(folder)
 
 

@@ -139,7 +139,9 @@ def test_poses_that_do_not_match_are_refused(
 
 
 def test_a_pose_file_that_does_not_exist_is_named(gtsam: Path) -> None:
-    with pytest.raises(FileFormatError, match=r"gone.txt: expected a readable file, got no such"):
+    with pytest.raises(
+        FileFormatError, match=r"gone.txt: expected a readable file, got no file of that name"
+    ):
         read_views(gtsam, poses=gtsam / "gone.txt")
 
 

@@ -162,7 +162,9 @@ def test_a_bad_file_is_refused_by_name_and_line(
 )
 def test_a_missing_file_is_named(log: Path, name: str) -> None:
     (log / name).unlink()
-    with pytest.raises(FileFormatError, match=f"{name}: expected a readable file, got no such"):
+    with pytest.raises(
+        FileFormatError, match=f"{name}: expected a readable file, got no file of that name"
+    ):
         read_views(log)
 
 

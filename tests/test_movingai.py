@@ -94,7 +94,9 @@ def test_a_map_that_breaks_its_format_is_refused(tmp_path: Path, text: str, mess
 
 
 def test_a_missing_map_is_named(tmp_path: Path) -> None:
-    with pytest.raises(FileFormatError, match=r"gone.map: expected a readable file, got no such"):
+    with pytest.raises(
+        FileFormatError, match=r"gone.map: expected a readable file, got no file of that name"
+    ):
         read_movingai_map(tmp_path / "gone.map")
 
 
@@ -243,7 +245,9 @@ def test_queries_in_voxels_that_break_their_format_are_refused(
 
 
 def test_missing_queries_are_named(tmp_path: Path) -> None:
-    with pytest.raises(FileFormatError, match=r"gone.scen: expected a readable file, got no such"):
+    with pytest.raises(
+        FileFormatError, match=r"gone.scen: expected a readable file, got no file of that name"
+    ):
         read_movingai_scen(tmp_path / "gone.scen")
 
 

@@ -10,10 +10,11 @@ import numpy as np
 
 from groundmap.errors import FileFormatError, InputError
 from groundmap.io.map_images import BlockedMap, BlockedVoxels
-from groundmap.io.rows import opened, read_rows, record
+from groundmap.io.rows import SHOWN_CHARACTERS, opened, read_rows, record
 
 PASSABLE, BLOCKED = ".GS", "@OTW"
-MOST_VOXELS = 2**30
+MOST_VOXELS = 2**26
+MOST_DIGITS = 9  # of the length of a side
 
 
 def read_movingai_map(path: str | PathLike[str], *, resolution: float = 1.0) -> BlockedMap:
@@ -102,11 +103,16 @@ def _voxel_header(path: Path) -> tuple[int, int, int]:
     key, *sides = line.split() or [""]
     if key != "voxel" or len(sides) != 3 or not all(map(str.isdecimal, sides)):
         raise FileFormatError(path, "'voxel X Y Z'", repr(line[:60]), line=1)
-    x, y, z = map(int, sides)
+    x, y, z = map(_side, sides)
     if not 0 < x * y * z <= MOST_VOXELS:
         expected = f"1 to {MOST_VOXELS} voxels"
         raise FileFormatError(path, expected, " x ".join(sides), line=1)
     return x, y, z
+
+
+def _side(text: str) -> int:
+    """Return the length of a map's side; 0 for what can't be one."""
+    return int(text) if text.isdecimal() and len(text) <= MOST_DIGITS else 0
 
 
 def _movingai_header(path: Path, lines: list[str]) -> tuple[int, int, int]:
@@ -117,9 +123,10 @@ def _movingai_header(path: Path, lines: list[str]) -> tuple[int, int, int]:
             break
         key, _, value = line.partition(" ")
         if key in ("height", "width"):
-            if not (value.strip().isdecimal() and int(value) > 0):
-                raise FileFormatError(path, f"{key} and a number above 0", repr(line), line=number)
-            sizes[key] = int(value)
+            sizes[key] = _side(value.strip())
+            if not sizes[key]:
+                got = repr(line[:SHOWN_CHARACTERS])
+                raise FileFormatError(path, f"{key} and a number above 0", got, line=number)
         elif key not in ("type", "version"):
             expected = "type, height, width or map"
             raise FileFormatError(path, expected, repr(line[:60]), line=number)

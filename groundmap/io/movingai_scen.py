@@ -11,6 +11,7 @@ from typing import NamedTuple
 from groundmap.errors import FileFormatError
 from groundmap.io.rows import SHOWN_CHARACTERS, opened
 
+MOST, MOST_DIGITS = 2**31, 20  # of a whole number
 COLUMNS = "bucket, map, width, height, start x, y, goal x, y, length"
 VOXEL_COLUMNS = "start x, y, z, goal x, y, z, length, ratio"
 
@@ -81,8 +82,8 @@ def _query(path: Path, number: int, line: str) -> MovingAIQuery:
     if len(words) != 8:
         raise _offence(path, number, line, COLUMNS)
     try:
-        int(bucket)
-        cols, rows, *ends = map(int, words[1:7])
+        _whole(bucket)
+        cols, rows, *ends = map(_whole, words[1:7])
         length = float(words[7])
     except ValueError as error:
         raise _offence(path, number, line, COLUMNS) from error
@@ -106,7 +107,7 @@ def _voxel_queries(path: Path, lines: Iterator[tuple[int, str]]) -> list[MovingA
 def _voxel_query(path: Path, number: int, line: str, map_file: Path) -> MovingAIQuery:
     words = line.split()
     try:
-        ends = [int(word) for word in words[:6]]
+        ends = [_whole(word) for word in words[:6]]
         length, _ = map(float, words[6:])
     except ValueError as error:
         raise _offence(path, number, line, VOXEL_COLUMNS) from error
@@ -115,6 +116,19 @@ def _voxel_query(path: Path, number: int, line: str, map_file: Path) -> MovingAI
     _check_length(path, number, length)
     start, goal = (tuple(ends[i : i + 3][::-1]) for i in (0, 3))
     return MovingAIQuery(map_file, (), start, goal, length, number)
+
+
+def _whole(word: str) -> int:
+    """Return a whole number of 32 bits.
+
+    Raises
+    ------
+    ValueError
+    """
+    number = int(word) if len(word) <= MOST_DIGITS else MOST
+    if not -MOST < number < MOST:
+        raise ValueError(word)
+    return number
 
 
 def _check_length(path: Path, number: int, length: float) -> None:
