@@ -16,6 +16,8 @@ import typer
 from rich.console import Console
 from rich.progress import track
 
+from groundmap.printable import printable
+
 T = TypeVar("T")
 
 # Not in the table for people: of a route, these are in its file; warnings are on stderr.
@@ -34,14 +36,15 @@ def emit(result: Mapping[str, Any], *, as_json: bool, title: str) -> None:
         return
     shown = {name.replace("_", " "): _shown(result[name]) for name in result if name not in LISTS}
     width = max(map(len, shown))
-    print(title, *(f"  {name:<{width}}  {value}" for name, value in shown.items()), sep="\n")
+    rows = (f"  {name:<{width}}  {value}" for name, value in shown.items())
+    print(printable(title), *map(printable, rows), sep="\n")
 
 
 def emit_columns(columns: Mapping[str, Mapping[str, Any]], *, title: str) -> None:
     """Print results side by side for people: a column for each, a row for each of their keys."""
     keys = list(next(iter(columns.values())))
     width = max(map(len, keys))
-    print(title)
+    print(printable(title))
     print(" " * width, *(f"{name:>10}" for name in columns), sep="  ")
     for key in keys:
         cells = (f"{_shown(column[key]):>10}" for column in columns.values())
@@ -57,7 +60,7 @@ def emit_rows(rows: Mapping[str, Mapping[str, Any]], *, title: str) -> None:
     widths = [
         max(len(head), *(len(row[i]) for row in cells.values())) for i, head in enumerate(heads)
     ]
-    print(title)
+    print(printable(title))
     for name, row in {"": heads, **cells}.items():
         padded = (f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))
         print(f"  {name:<{first}}", *padded, sep="  ")
@@ -65,7 +68,7 @@ def emit_rows(rows: Mapping[str, Mapping[str, Any]], *, title: str) -> None:
 
 def say(message: str) -> None:
     """Print a message on stderr."""
-    print(message, file=sys.stderr)
+    print(printable(message, lines=True), file=sys.stderr)
 
 
 def watched(items: Iterable[T], *, total: int, what: str) -> Iterator[T]:
@@ -137,4 +140,4 @@ def _shown(value: Any) -> str:
         return ", ".join(f"{key} {_shown(part)}" for key, part in value.items()) or "none"
     if isinstance(value, list | tuple):
         return ", ".join(_shown(part) for part in value) or "none"
-    return str(value)
+    return printable(str(value))

@@ -18,7 +18,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from groundmap.archive import read_archive, write_archive, write_atomically
+from groundmap.archive import check_writable, read_archive, write_archive, write_atomically
 from groundmap.errors import FileFormatError
 
 Array: TypeAlias = np.ndarray[Any, np.dtype[Any]]
@@ -253,3 +253,37 @@ def test_an_archive_with_a_wrong_bit_is_refused_or_reads_the_same(place: int, bi
     assert back == header
     for name in read.keys() & contents.keys():
         npt.assert_array_equal(read[name], contents[name])
+
+
+NOWHERE = [
+    ("gone/x.npz", "a file in a folder that exists, got no folder"),
+    ("folder", "a file name, got a folder"),
+    ("x" * 300, "a file that can be written, got file name too long"),
+    ("a\0b", "a file that can be written, got no such name"),
+    ("circle", "a file that can be written, got"),
+]
+
+
+@pytest.mark.parametrize(("name", "got"), NOWHERE, ids=["gone", "folder", "long", "NUL", "circle"])
+def test_what_cannot_be_written_is_refused_before_the_work(
+    tmp_path: Path, name: str, got: str
+) -> None:
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "circle").symlink_to(tmp_path / "circle" / "x")
+    before = sorted(tmp_path.iterdir())
+    with pytest.raises(FileFormatError, match=f"expected {got}"):
+        check_writable(tmp_path / name)
+    assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="a folder that root can't write to")
+def test_a_folder_that_cannot_be_written_to_is_refused_before_the_work() -> None:
+    with pytest.raises(FileFormatError, match="expected a file that can be written, got"):
+        check_writable("/proc/map.npz")
+
+
+def test_a_name_as_long_as_the_system_takes_is_written(tmp_path: Path) -> None:
+    path = tmp_path / ("x" * 255)
+    check_writable(path)
+    write_archive(path, HEADER, {})
+    assert [entry.name for entry in tmp_path.iterdir()] == ["x" * 255]

@@ -407,3 +407,44 @@ def assert_refused(ran: Ran, code: int, error: str | None, sentence: str) -> Non
 def test_the_version_is_that_of_the_package() -> None:
     ran = run("--version")
     assert (ran.code, ran.out) == (0, f"groundmap {version('groundmap')}\n")
+
+
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="a folder that root can't write to")
+def test_no_command_works_for_what_it_cannot_write(square: Path, tmp_path: Path) -> None:
+    ends = ("--start", "3,3", "--goal", "20,3", "--footprint", "0.4")
+    taken = tmp_path / "taken.pgm"
+    taken.mkdir()
+    long = "x" * 300
+    # What each of them reads first does not exist: it is not read.
+    gone = tmp_path / "gone.npz"
+    commands: list[tuple[str | Path, ...]] = [
+        ("map", tmp_path, "--out", "/proc/map.npz"),
+        ("map", tmp_path, "--out", tmp_path / long),
+        ("plan", gone, *ends, "--out", "/proc/route.csv"),
+        ("plan", gone, *ends, "--plot", "/proc/route.png"),
+        ("plot", gone, "--out", "/proc/map.png"),
+        ("plot", gone, "--out", tmp_path / f"{long}.png"),
+        ("convert", gone, "/proc/map.yaml"),
+        ("convert", square, tmp_path / "taken.yaml"),
+        ("evaluate", gone, "--plot", "/proc/map.png"),
+        ("scenario", "run", gone, "--report", "/proc/report.html"),
+        ("bench", "planning", "--samplers", "--map", gone, "--plot", "/proc/races.png"),
+        ("demo", "--out", "/proc/demo"),
+        ("demo", "--out", tmp_path / long),
+    ]
+    for command in commands:
+        ran = run(*command, "--json")
+        assert_refused(ran, 2, "FileFormatError", "expected a file")
+    assert list(tmp_path.iterdir()) == [taken]
+
+
+def test_names_with_control_characters_are_printed_escaped(square: Path, tmp_path: Path) -> None:
+    path = tmp_path / "a\x1b[2J\udcff.npz"
+    path.write_bytes(square.read_bytes())
+    ran = run_process("info", path)
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.out.startswith("map ")
+    assert r"a\x1b[2J\udcff.npz" in ran.out
+    ran = run("plan", path, "--\x1b[31m")
+    assert ran.code == 2
+    assert "\x1b" not in ran.err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -59,9 +60,9 @@ def map_courtyard() -> GroundMapper:
 
 def _check_folder(out: Path) -> None:
     """Check that the files can be written, the folder made where there is none."""
-    if out.is_file():
+    if os.path.isfile(out):  # unlike Path's, these raise at no name
         raise FileFormatError(out, "a folder, or the name of a new one", "a file")
-    if not out.is_dir():
+    if not os.path.isdir(out):
         check_writable(out)
         return
     for name in (MAP, ROUTE, PICTURE):
