@@ -67,8 +67,10 @@ class StereoRig:
         units = {"fx": "px", "fy": "px", "baseline": "m", "pixel_noise_px": "px"}
         for name, unit in units.items():
             value = getattr(self, name)
-            if not 0 < value < MOST:
-                raise CameraError(name, f"a number above 0 [{unit}], below {MOST:g}", str(value))
+            if not (np.isfinite(value) and value > 0):
+                raise CameraError(name, f"a number above 0 [{unit}]", str(value))
+            if value > MOST:
+                raise CameraError(name, f"a number up to {MOST:g} [{unit}]", str(value))
         if not (abs(self.cx) < MOST and abs(self.cy) < MOST):
             raise CameraError(
                 "cx, cy", f"finite numbers [px], below {MOST:g}", f"{self.cx}, {self.cy}"

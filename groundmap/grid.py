@@ -28,7 +28,7 @@ from groundmap.tiles import LAYERS, TILE_SHAPES, Index, Tile, Tiles
 from groundmap.window import CellState, GridWindow, cells_of
 
 FORMAT, VERSION = "groundmap-grid", 1
-SMALLEST, LARGEST, FARTHEST = 1e-9, 1e9, 1e12  # [m] cells and origin; areas are then numbers
+SMALLEST, LARGEST, FARTHEST = 1e-9, 1e9, 1e100  # [m] cells and origin; areas are then numbers
 MOST_CELLS = 2**28  # of a dense window: 3 GiB
 
 

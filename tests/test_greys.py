@@ -26,7 +26,9 @@ mode: {mode}
 """
 
 
-def read(folder: Path, pixels: Any, suffix: str = ".tif", **tags: int) -> Greys:
+def read(
+    folder: Path, pixels: Any, suffix: str = ".tif", tags: dict[str, int] | None = None
+) -> Greys:
     """Write an array as an image, with tags of a TIFF by name, and read it."""
     path = folder / f"image{suffix}"
     numbers = {"photometric": PHOTOMETRIC, "samples": SAMPLE_FORMAT, "bits": BITS}
@@ -71,7 +73,7 @@ def test_greys_of_16_bits_are_read_as_they_are(tmp_path: Path, suffix: str) -> N
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
 def test_a_tiff_whose_white_is_zero_is_turned(tmp_path: Path, kind: Any) -> None:
     pixels = np.array(RAMP, dtype=kind)
-    grey, white = read(tmp_path, pixels, photometric=0)
+    grey, white = read(tmp_path, pixels, tags={"photometric": 0})
     npt.assert_array_equal(grey, np.iinfo(kind).max - pixels)
     assert white == np.iinfo(kind).max
 
@@ -91,7 +93,7 @@ def test_a_tiff_of_other_numbers_is_refused(
 ) -> None:
     expected = f"whole numbers of up to 16 bits, got {got}.* Save it as a PNG"
     with pytest.raises(FileFormatError, match=expected):
-        read(tmp_path, pixels, **({"samples": 2} | tags if tags else {}))
+        read(tmp_path, pixels, tags=tags)
 
 
 def test_the_file_says_what_kind_of_image_it_is_and_documents_are_none(tmp_path: Path) -> None:

@@ -80,7 +80,7 @@ def test_a_value_out_of_range_is_refused_with_the_range(
         build(MapperSettings, **{name: value})
 
 
-@given(st.floats(1e-3, 10.0), st.integers(1, 1000))
+@given(st.floats(5e-3, 10.0), st.integers(1, 1000))
 def test_settings_hold_what_they_were_given(resolution: float, cap: int) -> None:
     settings = MapperSettings(resolution=resolution, cap=cap)
     assert (settings.resolution, settings.cap) == (resolution, cap)
@@ -114,3 +114,9 @@ def test_settings_in_the_wrong_order_are_refused(values: dict[str, float], messa
 def test_disparities_of_false_matches_in_the_wrong_order_are_refused() -> None:
     with pytest.raises(SettingsError, match=r"^false_disparity_px: .* ascending .*, got 120, 5"):
         SensorSettings(false_disparity_px=(120, 5))
+
+
+def test_a_range_of_too_many_cells_is_refused() -> None:
+    with pytest.raises(SettingsError, match=r"^resolution: expected 0.005 or more, for max_range"):
+        build(MapperSettings, resolution=0.004)
+    assert build(MapperSettings, resolution=0.004, max_range=16.0)
