@@ -37,8 +37,9 @@ def check_transform(name: str, matrix: npt.ArrayLike) -> Floats:
     transform = as_floats(name, matrix, (4, 4)).copy()  # what is checked is not changed later
     check_finite(name, transform)
     rotation = transform[:3, :3]
-    deviation = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
-    if deviation > ORTHONORMAL_TOLERANCE:
+    with np.errstate(over="ignore", invalid="ignore"):
+        deviation = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
+    if not deviation <= ORTHONORMAL_TOLERANCE:
         raise CameraError(
             name,
             "a rotation with orthonormal rows",

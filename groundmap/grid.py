@@ -69,10 +69,10 @@ class ConfidenceGrid:
             raise InputError("frame", "a name", repr(frame))
         if not (is_number(resolution) and resolution > 0):
             raise InputError("resolution", "a number above 0 [m]", repr(resolution)[:60])
-        if len(origin) not in TILE_SHAPES:
-            raise InputError("origin", "2 or 3 numbers [m]", f"{len(origin)}")
+        self.origin = as_floats("origin", origin, (None,))
+        if len(self.origin) not in TILE_SHAPES:
+            raise InputError("origin", "2 or 3 numbers [m]", f"{len(self.origin)}")
         self.resolution = float(resolution)
-        self.origin = as_floats("origin", origin, (len(origin),))
         check_finite("origin", self.origin)
         self.frame, self.rule = frame, rule or Average()
         self._tiles = Tiles(len(origin))
