@@ -40,7 +40,7 @@ def as_floats(name: str, values: npt.ArrayLike, shape: tuple[int | None, ...]) -
         ...
     groundmap.errors.InputError: points: expected shape (n, 2), got shape (2,).
     """
-    array = _numbers(name, values, f"numbers of shape {_shown(shape)}")
+    array = as_numbers(name, values, f"numbers of shape {_shown(shape)}")
     if array.size == 0 and None in shape and array.ndim != len(shape):
         array = array.reshape([0 if length is None else length for length in shape])
     fits = array.ndim == len(shape) and all(
@@ -64,7 +64,7 @@ def as_positions(name: str, values: npt.ArrayLike, length: int) -> Floats:
     >>> as_positions("xy", (1, 2), 2)
     array([[1., 2.]])
     """
-    array = _numbers(name, values, f"numbers of shape {_shown((None, length))}")
+    array = as_numbers(name, values, f"numbers of shape {_shown((None, length))}")
     positions = as_floats(name, np.atleast_2d(array), (None, length))
     check_finite(name, positions)
     return positions
@@ -131,8 +131,14 @@ def check_finite(name: str, values: Floats, *, hint: str = "") -> None:
         raise InputError(name, "finite numbers", str(values[index]), where=where, hint=hint)
 
 
-def _numbers(name: str, values: npt.ArrayLike, expected: str) -> Floats:
-    """Return `values` as float64; numbers beyond its range become infinite."""
+def as_numbers(name: str, values: npt.ArrayLike, expected: str) -> Floats:
+    """Return `values` as float64 of any shape; numbers beyond its range become infinite.
+
+    Raises
+    ------
+    InputError
+        Not real numbers, which are not what was `expected`.
+    """
     try:
         given = np.asarray(values)
         if given.dtype.kind not in REAL_KINDS:

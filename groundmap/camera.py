@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import Bools, Floats, as_floats
+from groundmap.arrays import Bools, Floats, as_floats, as_numbers, is_number
 from groundmap.errors import CameraError
 from groundmap.frames import check_transform
+from groundmap.printable import shown
 
 MOST = 1e9  # of any number of a rig: far beyond all rigs, and its square is a number
 
@@ -67,13 +68,15 @@ class StereoRig:
         units = {"fx": "px", "fy": "px", "baseline": "m", "pixel_noise_px": "px"}
         for name, unit in units.items():
             value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise CameraError(name, f"a number above 0 [{unit}]", str(value))
+            if not (is_number(value) and value > 0):
+                raise CameraError(name, f"a number above 0 [{unit}]", shown(value))
             if value > MOST:
-                raise CameraError(name, f"a number up to {MOST:g} [{unit}]", str(value))
-        if not (abs(self.cx) < MOST and abs(self.cy) < MOST):
+                raise CameraError(name, f"a number up to {MOST:g} [{unit}]", shown(value))
+        if not all(is_number(value) and abs(value) < MOST for value in (self.cx, self.cy)):
             raise CameraError(
-                "cx, cy", f"finite numbers [px], below {MOST:g}", f"{self.cx}, {self.cy}"
+                "cx, cy",
+                f"finite numbers [px], below {MOST:g}",
+                f"{shown(self.cx)}, {shown(self.cy)}",
             )
         object.__setattr__(
             self, "T_base_camera", check_transform("T_base_camera", self.T_base_camera)
@@ -115,12 +118,12 @@ class StereoRig:
         Depth is fx * baseline / disparity; the covariance is the Jacobian's, from independent
         noise of uL, uR and v (Matthies and Shafer 1987).
         """
-        array = np.asarray(pixels, dtype=np.float64)
+        array = as_numbers("pixels", pixels, "numbers of shape (n, 3) or (n, 2, 3)")
         ends = array.ndim == 3
         array = as_floats("pixels", array, (None, 2, 3) if ends else (None, 3))
         rows = array.reshape(len(array), 2 if ends else 1, 3)
         finite: Bools = np.logical_and.reduce(np.isfinite(rows), axis=(1, 2))
-        with np.errstate(invalid="ignore"):
+        with np.errstate(over="ignore", invalid="ignore"):
             disparity_px = rows[:, :, 0] - rows[:, :, 1]
             visible: Bools = np.logical_and.reduce(disparity_px > 0, axis=1)
         kept: Bools = finite & visible
@@ -152,4 +155,6 @@ class StereoRig:
         jacobian[..., :, 1] = -by_disparity
         jacobian[..., 0, 0] += scale
         jacobian[..., 1, 2] = scale * (self.fx / self.fy)
-        return self.pixel_noise_px**2 * (jacobian @ np.swapaxes(jacobian, -1, -2))
+        variance = np.float64(self.pixel_noise_px) ** 2  # infinite where Python's would raise
+        covariance: Floats = variance * (jacobian @ np.swapaxes(jacobian, -1, -2))
+        return covariance

@@ -18,7 +18,7 @@ from groundmap.surfaces import SurfaceKind, Surfaces
 from groundmap.uncertainty import MODELS
 
 MARGIN = 1  # [cells] around what is drawn, so that rounding can't push a border cell outside
-MOST_CELLS = 2**28  # a block of 1 GiB: more is a resolution in the wrong unit
+MOST_CELLS = 2**26  # a block of 256 MiB: more is a resolution in the wrong unit
 
 
 class Evidence(NamedTuple):
@@ -51,7 +51,7 @@ def evidence_of(
     Raises
     ------
     InputError
-        The view reaches over more than 2**28 cells.
+        The view reaches over more than 2**26 cells.
     """
     model = MODELS[settings.uncertainty]
     to_cells = _CellsOf(flat, grid)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from groundmap.ground import GroundPlane
 
 COVARIANCE_TOLERANCE = 1e-5  # of the largest entry: what text with five digits is off
+FARTHEST = 1e8  # [m] from the camera
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,8 +102,8 @@ class View:
         Pose of ``base_link`` in the map.
     rig : StereoRig
     points, segments : Features
-        Features in the camera frame. Rows that are not finite or lie behind the camera are
-        dropped and counted; `from_pixels` counts those without disparity, too.
+        Features in the camera frame. Rows that are not finite, lie behind the camera or beyond
+        1e8 m are dropped and counted; `from_pixels` counts those without disparity, too.
     timestamp : float, optional [s]
     plane : GroundPlane, optional
         The ground under this view; `groundmap.fit_ground` puts it there.
@@ -133,10 +134,12 @@ class View:
             finite &= np.isfinite(features.covariance).all(axis=(*axes, axes[-1] + 1))
             with np.errstate(invalid="ignore"):
                 ahead: Bools = np.logical_and.reduce(features.xyz[..., 2] > 0, axis=axes[:-1])
-            if not (finite & ahead).all():
+            near: Bools = np.logical_and.reduce(np.abs(features.xyz) <= FARTHEST, axis=axes)
+            if not (finite & ahead & near).all():
                 dropped["not_finite"] += int((~finite).sum())
                 dropped["behind_camera"] += int((finite & ~ahead).sum())
-                object.__setattr__(self, name, features.select(finite & ahead))
+                dropped["out_of_range"] += int((finite & ahead & ~near).sum())
+                object.__setattr__(self, name, features.select(finite & ahead & near))
         object.__setattr__(self, "dropped", +dropped)
 
     @classmethod
@@ -163,7 +166,7 @@ class View:
         points = rig.triangulate(as_floats("points_px", points_px, (None, 3)))
         segments = rig.triangulate(as_floats("segments_px", segments_px, (None, 2, 3)))
         return cls(
-            T_map_base=np.asarray(T_map_base, dtype=np.float64),
+            T_map_base=as_floats("T_map_base", T_map_base, (4, 4)),
             rig=rig,
             points=Features(
                 points.xyz, points.covariance, _kept(point_ids, points.kept, "point_ids")

@@ -75,10 +75,10 @@ class ConfidenceGrid:
             raise InputError("resolution", "a number above 0 [m]", shown(resolution))
         if not SMALLEST <= resolution <= LARGEST:
             raise InputError("resolution", f"{SMALLEST:g} to {LARGEST:g} m", str(resolution))
-        if len(origin) not in TILE_SHAPES:
-            raise InputError("origin", "2 or 3 numbers [m]", f"{len(origin)}")
+        self.origin = as_floats("origin", origin, (None,))
+        if len(self.origin) not in TILE_SHAPES:
+            raise InputError("origin", "2 or 3 numbers [m]", f"{len(self.origin)}")
         self.resolution = float(resolution)
-        self.origin = as_floats("origin", origin, (len(origin),))
         check_finite("origin", self.origin)
         if (np.abs(self.origin) > FARTHEST).any():
             raise InputError("origin", f"numbers up to {FARTHEST:g} m", str(self.origin.tolist()))

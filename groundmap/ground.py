@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from groundmap.arrays import Floats, as_floats, check_finite
+from groundmap.arrays import Floats, as_floats, check_finite, is_number
 from groundmap.camera import StereoRig
 from groundmap.errors import InputError, NoGroundPlaneError
 from groundmap.features import View
@@ -52,10 +52,11 @@ class GroundPlane:
     def __post_init__(self) -> None:
         normal = as_floats("normal", self.normal, (3,))
         check_finite("normal", normal)
-        length = float(np.linalg.norm(normal))
+        with np.errstate(over="ignore"):
+            length = float(np.linalg.norm(normal))
         if abs(length - 1.0) > 1e-6:
             raise InputError("normal", "a vector of length 1", f"length {length:.6g}")
-        if not (np.isfinite(self.offset) and np.isfinite(self.sigma_tilt) and self.sigma_tilt >= 0):
+        if not (is_number(self.offset) and is_number(self.sigma_tilt) and self.sigma_tilt >= 0):
             raise InputError(
                 "plane",
                 "a finite offset [m] and a sigma_tilt of 0 or more [rad]",
@@ -66,8 +67,8 @@ class GroundPlane:
     @classmethod
     def below_camera(cls, rig: StereoRig, camera_height: float) -> GroundPlane:
         """Return the level ground that lies `camera_height` [m] below the left camera."""
-        if not (np.isfinite(camera_height) and camera_height > 0):
-            raise InputError("camera_height", "a number above 0 [m]", str(camera_height))
+        if not (is_number(camera_height) and camera_height > 0):
+            raise InputError("camera_height", "a number above 0 [m]", str(camera_height)[:60])
         offset = camera_height - float(rig.up @ rig.T_base_camera[:3, 3])
         return cls(normal=rig.up, offset=offset)
 

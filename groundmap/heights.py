@@ -49,6 +49,7 @@ class _Heights(NamedTuple):
     height: Floats
     tolerance: Floats
     radius: Floats  # horizontal distance from the camera [m]
+    sigma: Floats  # standard deviation of the place in its least certain direction [m]
     feature: Ints  # number in the view, points first
 
     def at(self, t: Floats) -> _Heights:
@@ -66,6 +67,7 @@ class _Heights(NamedTuple):
             blend(self.height),
             blend(self.tolerance),
             np.hypot(xy[..., 0], xy[..., 1]),
+            blend(self.sigma),
             np.broadcast_to(self.feature[:, :1], t.shape),
         )
 
@@ -75,8 +77,9 @@ def flatten(view: View, settings: MapperSettings, *, number: int | None = None) 
 
     Ground features lie within max(step_height, 2 sigma_h + r sigma_tilt) of the plane; obstacle
     features above that, up to the robot's height; higher ones are overhead, lower ones below
-    ground. A segment that leaves the obstacle band is clipped to it. `number` is the index of the
-    view in its log, for error messages.
+    ground. A segment that leaves the obstacle band is clipped to it. Features whose standard
+    deviation is above `max_range` are dropped. `number` is the index of the view in its log, for
+    error messages.
 
     Raises
     ------
@@ -146,7 +149,13 @@ def _measure(
     number = np.arange(len(features)).reshape(-1, *(1,) * (radius.ndim - 1)) + np.zeros_like(
         radius, dtype=np.int64
     )
-    return _Heights(xy, axes @ features.covariance @ axes.T, height, tolerance, radius, number)
+    # The trace of a covariance lies between its largest variance and three times that.
+    with np.errstate(over="ignore"):
+        trace = np.trace(features.covariance, axis1=-2, axis2=-1)
+    spread = np.sqrt(np.maximum(trace, 0.0))
+    return _Heights(
+        xy, axes @ features.covariance @ axes.T, height, tolerance, radius, spread, number
+    )
 
 
 class _Classes(NamedTuple):
@@ -159,13 +168,17 @@ class _Classes(NamedTuple):
 def _point_classes(points: _Heights, settings: MapperSettings, dropped: Counter[str]) -> _Classes:
     near = points.radius < settings.min_range
     far = points.radius > settings.max_range
-    inside = ~near & ~far
+    unsure = ~near & ~far & (points.sigma > settings.max_range)
+    inside = ~near & ~far & ~unsure
     overhead = inside & (points.height > settings.robot_height)
     below = inside & (points.height < -points.tolerance)
     ground = inside & ~overhead & (np.abs(points.height) <= points.tolerance)
     obstacle = inside & ~overhead & ~below & ~ground
     dropped.update(
-        too_near=int(near.sum()), out_of_range=int(far.sum()), overhead=int(overhead.sum())
+        too_near=int(near.sum()),
+        out_of_range=int(far.sum()),
+        too_uncertain=int(unsure.sum()),
+        overhead=int(overhead.sum()),
     )
     dropped["below_ground"] += int(below.sum())
     return _Classes(
@@ -180,6 +193,9 @@ def _segment_classes(
     segments: _Heights, settings: MapperSettings, dropped: Counter[str]
 ) -> _Classes:
     """Cut every segment into its obstacle piece and its ground piece, each possibly empty."""
+    unsure: Bools = np.logical_or.reduce(segments.sigma > settings.max_range, axis=1)
+    dropped["too_uncertain"] += int(unsure.sum())
+    segments = _pick(segments, ~unsure)
     reached = inside_circle(segments.xy[:, 0], segments.xy[:, 1], settings.max_range)
     over_step = segments.height - segments.tolerance
     over_hole = segments.height + segments.tolerance

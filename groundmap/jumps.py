@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import Bools, Floats, as_floats, as_positions
+from groundmap.arrays import Bools, Floats, as_floats, as_numbers, as_positions
 
 FAR_LONGER = 10.0  # a jump is longer than so many typical steps
 LEAST_JUMP = 3.0  # [m], a shorter step is none: keyframes are taken that far apart
@@ -49,22 +50,24 @@ def pose_jumps(positions: npt.ArrayLike, times: npt.ArrayLike | None = None) -> 
     >>> pose_jumps(drive)
     [Jump(view=7, step=900.5, typical_step=0.5)]
     """
-    shape = np.shape(positions)
-    places = as_positions("positions", positions, shape[-1] if len(shape) == 2 else 2)
+    given = as_numbers("positions", positions, "numbers of shape (n, 2) or (n, 3)")
+    places = as_positions("positions", given, 3 if given.shape[1:] == (3,) else 2)
     if len(places) < 2:
         return []
-    steps = np.sqrt((np.diff(places, axis=0) ** 2).sum(axis=1))
+    with np.errstate(over="ignore"):  # farther than numbers reach is far
+        steps = np.hypot.reduce(np.diff(places, axis=0), axis=1)
     typical = _typical(steps, steps)
     far = _far(steps, typical, LEAST_JUMP)
     if times is not None:
         spans = np.diff(as_floats("times", times, (len(places),)))
         # Views at one time, or in another order than time's, leave no time to move.
-        speeds = np.where(spans > 0, steps / np.where(spans > 0, spans, 1.0), np.inf)
+        with np.errstate(over="ignore"):
+            speeds = np.where(spans > 0, steps / np.where(spans > 0, spans, 1.0), np.inf)
         far &= _far(speeds, _typical(speeds, steps), 0.0)
     jumps: list[Jump] = []
     for number in np.flatnonzero(far).tolist():
         back = number and far[number - 1] and jumps and jumps[-1].view == number
-        if back and np.linalg.norm(places[number + 1] - places[number - 1]) < 0.5 * steps[number]:
+        if back and math.dist(places[number + 1], places[number - 1]) < 0.5 * steps[number]:
             continue
         jumps.append(Jump(number + 1, float(steps[number]), float(typical[number])))
     return jumps
@@ -78,12 +81,14 @@ def _far(values: Floats, typical: Floats, least: float) -> Bools:
 def _typical(values: Floats, steps: Floats) -> Floats:
     """Return, for each step, the median of all but pauses, or of those around it if it is more."""
     moving = values[steps > STANDSTILL]
-    overall = float(np.median(moving)) if len(moving) else 0.0
+    with np.errstate(over="ignore"):
+        overall = float(np.median(moving)) if len(moving) else 0.0
     around = np.full(len(values) + 2 * AROUND, np.nan)
     around[AROUND:-AROUND] = values
     windows = np.lib.stride_tricks.sliding_window_view(around, 2 * AROUND + 1)
     others = np.delete(windows, AROUND, axis=1)
     known = ~np.isnan(others).all(axis=1)
     typical = np.full(len(values), overall)
-    typical[known] = np.maximum(overall, np.nanmedian(others[known], axis=1))
+    with np.errstate(over="ignore"):
+        typical[known] = np.maximum(overall, np.nanmedian(others[known], axis=1))
     return typical

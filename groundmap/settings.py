@@ -10,7 +10,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from groundmap.errors import SettingsError
 from groundmap.printable import shown
 
-MOST_CELLS_OF_RANGE = 4000  # a view's block then has 64 million cells
+LARGEST = 1e4  # of lengths [m], ratios and angles: nothing that a rig sees needs more
+FINEST = 4_000  # cells, or samples, along max_range: a view's block then has 64 million cells
 
 
 class Settings(BaseModel):
@@ -88,64 +89,97 @@ class MapperSettings(Settings):
     uncertainty: Literal["ellipsoid", "radius", "none"] = Field(
         "ellipsoid", description="how a surface spreads over the cells it may be in"
     )
-    spread_sigmas: float = Field(2.0, ge=0, description="spread of a surface [standard deviations]")
-    min_range: float = Field(0.3, gt=0, description="nearer features are dropped [m]")
-    max_range: float = Field(20.0, gt=0, description="farther features are dropped [m]")
-    step_height: float = Field(0.15, gt=0, description="what the robot drives over [m]")
-    robot_height: float = Field(2.0, gt=0, description="higher features are overhead [m]")
+    spread_sigmas: float = Field(
+        2.0, ge=0, le=LARGEST, description="spread of a surface [standard deviations]"
+    )
+    min_range: float = Field(0.3, gt=0, le=LARGEST, description="nearer features are dropped [m]")
+    max_range: float = Field(20.0, gt=0, le=LARGEST, description="farther features are dropped [m]")
+    step_height: float = Field(0.15, gt=0, le=LARGEST, description="what the robot drives over [m]")
+    robot_height: float = Field(
+        2.0, gt=0, le=LARGEST, description="higher features are overhead [m]"
+    )
     narrowest_footprint: float = Field(
         1.0, gt=0, description="width of the narrowest robot that will use the map [m]"
     )
-    link_length: float = Field(0.5, ge=0, description="links up to this length are believed [m]")
-    link_angle: float = Field(0.04, ge=0, description="the same, per metre of range [rad]")
+    link_length: float = Field(
+        0.5, ge=0, le=LARGEST, description="links up to this length are believed [m]"
+    )
+    link_angle: float = Field(
+        0.04, ge=0, le=LARGEST, description="the same, per metre of range [rad]"
+    )
     link_height: float = Field(
-        0.5, ge=0, description="height band of a point feature, for links [m]"
+        0.5, ge=0, le=LARGEST, description="height band of a point feature, for links [m]"
     )
     doubt: float = Field(
-        3.0, ge=1, description="unbelieved links up to this many times as long still end sight"
+        3.0,
+        ge=1,
+        le=LARGEST,
+        description="unbelieved links up to this many times as long still end sight",
     )
     halo: float = Field(
-        0.15, ge=0, description="what a feature is on may go on as far as this beside it [m]"
+        0.15,
+        ge=0,
+        le=LARGEST,
+        description="what a feature is on may go on as far as this beside it [m]",
     )
     smoothing: float = Field(
-        0.25, ge=0, description="features this near across the line of sight are averaged [m]"
+        0.25,
+        ge=0,
+        le=LARGEST,
+        description="features this near across the line of sight are averaged [m]",
     )
     grant_height: float = Field(
         0.5,
         gt=0,
+        le=LARGEST,
         description="sight that comes down to this share of the camera's height grants freespace",
     )
     sight_gap: float = Field(
-        0.8, ge=0, description="gap between lines of sight that counts as seen [m]"
+        0.8, ge=0, le=LARGEST, description="gap between lines of sight that counts as seen [m]"
     )
     support_width: float = Field(
-        0.3, gt=0, description="half-width of the ground a ground feature vouches for [m]"
+        0.3,
+        gt=0,
+        le=LARGEST,
+        description="half-width of the ground a ground feature vouches for [m]",
     )
-    support_angle: float = Field(0.05, gt=0, description="its upper bound as a bearing [rad]")
+    support_angle: float = Field(
+        0.05, gt=0, le=LARGEST, description="its upper bound as a bearing [rad]"
+    )
 
     def check(self) -> None:
-        """Refuse ranges and heights out of order."""
+        """Refuse ranges and heights out of order, and cells too small for the range."""
         self.check_order("min_range", "max_range")
         self.check_order("step_height", "robot_height")
-        if self.max_range > MOST_CELLS_OF_RANGE * self.resolution:
-            raise SettingsError(
-                "resolution",
-                f"{self.max_range / MOST_CELLS_OF_RANGE:g} or more, for max_range "
-                f"{self.max_range:g}",
-                f"{self.resolution:g}",
-                hint="A view takes memory and time with the square of max_range / resolution.",
-            )
+        for name in ("resolution", "support_width"):
+            if getattr(self, name) * FINEST < self.max_range:
+                raise SettingsError(
+                    name,
+                    f"at least max_range / {FINEST}, which is {self.max_range / FINEST:.4g} m",
+                    f"{getattr(self, name):g}",
+                    hint=f"Give a larger {name}, or a smaller max_range [m].",
+                )
 
 
 class GroundSettings(Settings):
     """All that `groundmap.fit_ground` can be told."""
 
-    window: int = Field(11, ge=1, description="views that one plane is fitted to [views]")
+    window: int = Field(
+        11, ge=1, le=10_000, description="views that one plane is fitted to [views]"
+    )
     causal: bool = Field(False, description="use earlier views only, as a live mapper must")
-    max_range: float = Field(20.0, gt=0, description="farther features are left out [m]")
-    lowest_camera: float = Field(0.1, gt=0, description="least height of the camera [m]")
-    highest_camera: float = Field(5.0, gt=0, description="greatest height of the camera [m]")
-    min_support: int = Field(12, ge=3, description="least features on a plane [features]")
+    max_range: float = Field(
+        20.0, gt=0, le=LARGEST, description="farther features are left out [m]"
+    )
+    lowest_camera: float = Field(
+        0.1, gt=0, le=LARGEST, description="least height of the camera [m]"
+    )
+    highest_camera: float = Field(
+        5.0, gt=0, le=LARGEST, description="greatest height of the camera [m]"
+    )
+    min_support: int = Field(
+        12, ge=3, le=1_000_000, description="least features on a plane [features]"
+    )
 
     def check(self) -> None:
         """Refuse camera heights out of order."""

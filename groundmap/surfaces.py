@@ -107,7 +107,9 @@ def find_surfaces(flat: FlatView, mesh: Mesh, settings: MapperSettings) -> Surfa
     everything = np.concatenate([ends.xy, _silhouettes(discs.xy, radius)])
     core = np.full(len(radius), MODELS[settings.uncertainty].core_radius(settings.resolution))
     cores = np.concatenate([ends.xy, _silhouettes(discs.xy, core)])
-    reach = settings.spread_sigmas * np.concatenate([ends.sigma, _twice(discs.sigma)])
+    sigma = np.concatenate([ends.sigma, _twice(discs.sigma)])
+    # No surface spreads farther than features are used, whatever sigma is.
+    reach = np.minimum(settings.spread_sigmas * sigma, settings.max_range)
     bottoms = np.concatenate([ends.low, _twice(discs.low)])
     tops = np.concatenate([ends.high, _twice(discs.high)])
     kind = np.concatenate([kinds, np.full(len(radius), SurfaceKind.LONE)])

@@ -10,10 +10,11 @@ import pythoncdt as cdt
 import shapely
 from scipy.spatial import KDTree
 
-from groundmap.arrays import Bools, Floats, Ints, as_floats, check_finite
+from groundmap.arrays import Bools, Floats, Ints, as_cells, as_floats, check_finite
 from groundmap.errors import InputError
 
 MERGE_DISTANCE = 1e-3  # [m], nearer points are one vertex
+FARTHEST = 1e12  # [m] from the origin
 NINE_SQUARES = [(i, j) for i in (-1.0, 0.0, 1.0) for j in (-1.0, 0.0, 1.0)]
 NODING_GRID = 1e-3  # [m], where crossings snap to if the library can't resolve them
 
@@ -46,7 +47,7 @@ def triangulate(points: npt.ArrayLike, segments: npt.ArrayLike = ()) -> Mesh:
     Raises
     ------
     InputError
-        NaN or infinity, or a segment that names no point.
+        NaN or infinity, a point beyond 1e12 m, or a segment that names no point.
 
     Notes
     -----
@@ -63,7 +64,12 @@ def triangulate(points: npt.ArrayLike, segments: npt.ArrayLike = ()) -> Mesh:
     xy = as_floats("points", points, (None, 2))
     # The library never returns from infinite coordinates, so this check comes first.
     check_finite("points", xy)
-    pairs = np.asarray(segments, dtype=np.int64).reshape(-1, 2)
+    far = np.abs(xy) > FARTHEST
+    if far.any():  # nor from such whose products overflow
+        row = int(np.argwhere(far)[0, 0])
+        expected = f"coordinates within {FARTHEST:g} m"
+        raise InputError("points", expected, str(xy[row].tolist()), where=f"row {row}")
+    pairs = as_cells("segments", segments, 2)
     outside = (pairs < 0) | (pairs >= len(xy))
     if outside.any():
         row = int(np.argwhere(outside)[0, 0])

@@ -19,7 +19,9 @@ from groundmap.arrays import (
     Ints,
     as_cells,
     as_positions,
+    is_number,
 )
+from groundmap.errors import InputError
 
 EPSILON = 0.01  # |confidence| below this is contested
 DROP_OFF_VIEWS = 3  # a drop-off seen in this many views is non-free, whatever the average says
@@ -56,7 +58,15 @@ class GridWindow:
     resolution: float
 
     def states(self, *, epsilon: float = EPSILON) -> Bytes:
-        """Return the `CellState` of every cell, as uint8."""
+        """Return the `CellState` of every cell, as uint8.
+
+        Raises
+        ------
+        InputError
+            `epsilon` is not a number from 0 to 1.
+        """
+        if not (is_number(epsilon) and 0 <= epsilon <= 1):
+            raise InputError("epsilon", "a number from 0 to 1", repr(epsilon)[:60])
         states = np.full(self.count.shape, CellState.CONTESTED, dtype=np.uint8)
         states[self.confidence <= -epsilon] = CellState.FREE
         states[self.confidence >= epsilon] = CellState.NONFREE
