@@ -10,11 +10,12 @@ import numpy as np
 from groundmap.arrays import Bools, Floats
 from planners.audit import audit
 from planners.audit3d import audit3d
-from planners.costmap import SLACK, Costmap
+from planners.costmap import Costmap
 from planners.engine import Found, Pose
 from planners.errors import NonFreeError, OutsideMapError, ProblemError, UnknownSpaceError
 from planners.kernels.footprint import pose_clear
 from planners.problem import PlanningProblem
+from planners.rounding import slack_at
 from planners.route import Route
 from planners.space import Space
 from planners.voxels import Voxels
@@ -144,13 +145,12 @@ def _fits(space: Space, blocked: Bools, xy: Point, yaw: float | None) -> bool:
     position = space.to_cells(xy)[0]
     if yaw is None or polygon is None:
         cell = tuple(np.floor(position).astype(np.int64)[::-1])
-        return (
-            not blocked[cell]
-            and space.clearance_of(xy, to=blocked, limit=space.radius) >= space.radius - SLACK
-        )
+        least = space.radius - slack_at(xy)
+        return not blocked[cell] and space.clearance_of(xy, to=blocked, limit=space.radius) >= least
     x, y = position.tolist()
-    corners = polygon / space.window.resolution
-    return bool(pose_clear(blocked, corners, x, y, math.cos(yaw), math.sin(yaw)))
+    size = space.window.resolution
+    touch = slack_at(xy) / size
+    return bool(pose_clear(blocked, polygon / size, x, y, math.cos(yaw), math.sin(yaw), touch))
 
 
 def space_of(problem: PlanningProblem) -> Costmap | Voxels:

@@ -19,8 +19,7 @@ from planners.kernels.distance import NOWHERE, squared_distances
 from planners.lattice import allowed_moves, squared_need
 from planners.layers import Layers, cap, layers_of, metres, padded_window
 from planners.problem import PlanningProblem
-
-SLACK = 5e-10  # [m] shortfall of clearance that is put down to the rounding of coordinates
+from planners.rounding import slack_at
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +116,11 @@ class Costmap:
     def radius(self) -> float:
         """Distance that the footprint's centre keeps from what is blocked [m]."""
         return self.problem.radius
+
+    @property
+    def slack(self) -> float:
+        """Shortfall of the radius that is put down to rounding, on lines from start to goal [m]."""
+        return slack_at(self.problem.start_xy, self.problem.goal_xy)
 
     @property
     def width(self) -> int:

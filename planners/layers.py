@@ -18,9 +18,9 @@ from planners.errors import ProblemError
 from planners.kernels.distance import NOWHERE, squared_distances
 from planners.lattice import squared_need
 from planners.problem import PlanningProblem
+from planners.rounding import slack_at
 
 MOST_CELLS = 2**25  # of a costmap: what is held of it takes about 50 bytes for each
-EDGE = 5e-10  # [m] squares farther by less come within the clear radius, up to rounding
 
 
 class Layers(NamedTuple):
@@ -117,5 +117,6 @@ def near_start(problem: PlanningProblem, window: GridWindow) -> Bools:
         first = np.arange(length)
         gaps = np.maximum(np.maximum(first - at, at - first - 1), 0.0)
         squared = squared + np.expand_dims(gaps**2, [k for k in range(len(shape)) if k != axis])
-    near: Bools = np.sqrt(squared) * window.resolution <= problem.clear_radius + EDGE
+    reach = problem.clear_radius + slack_at(problem.clear_place)
+    near: Bools = np.sqrt(squared) * window.resolution <= reach
     return near
