@@ -15,7 +15,7 @@ from planners.answers import check_on_map
 from planners.costmap import Costmap, whole_cells
 from planners.dstar_lite import DStarLite, DStarLiteSettings
 from planners.errors import ProblemError
-from planners.layers import padded_bounds
+from planners.extent import padded_bounds
 from planners.problem import PlanningProblem
 from planners.rounding import slack_at
 from planners.route import Route

@@ -12,9 +12,10 @@ import numpy.typing as npt
 from groundmap.arrays import Bools, Floats, Ints, Ints32
 from groundmap.window import CellState, GridWindow
 from planners.errors import ProblemError
+from planners.extent import padded_window
 from planners.kernels.clearance3d import line_clearance, segment_clearance
 from planners.lattice import squared_need
-from planners.layers import near_start, padded_window
+from planners.layers import near_start
 from planners.problem import PlanningProblem
 from planners.rounding import slack_at
 
