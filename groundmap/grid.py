@@ -110,6 +110,10 @@ class ConfidenceGrid:
         """Iterate over (index, tile) in the order of the indices."""
         return self._tiles.items()
 
+    def has_tile(self, index: Index) -> bool:
+        """Whether the tile of that index was touched."""
+        return self._tiles.get(index) is not None
+
     def confidence_at(self, xy: npt.ArrayLike) -> float | Floats32:
         """Return the confidence at map positions (x, y) [m]; 0 where nothing was seen."""
         values: Floats32 = self._at(xy, "confidence")

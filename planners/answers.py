@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
+from scipy import ndimage
 
 from groundmap.arrays import Bools, Floats
 from planners.audit import audit
 from planners.audit3d import audit3d
-from planners.costmap import SLACK, Costmap
+from planners.costmap import Costmap
 from planners.engine import Found, Pose
 from planners.errors import NonFreeError, OutsideMapError, ProblemError, UnknownSpaceError
 from planners.kernels.footprint import pose_clear
 from planners.problem import PlanningProblem
+from planners.rounding import rounding_at, slack_at
 from planners.route import Route
 from planners.space import Space
 from planners.voxels import Voxels
-from planners.wording import Place, Point
+from planners.wording import Place, Point, shown
+
+MOST_LOOKUPS = 64  # tiles near a place beyond which all touched tiles are looked at instead
 
 
 def costmap_of(problem: PlanningProblem) -> Costmap:
@@ -77,7 +83,8 @@ def check_on_map(problem: PlanningProblem, *, goal: bool = True) -> None:
         if not _touches_tile(problem, xy, margin):
             if not any(True for _ in grid.tiles()):
                 raise OutsideMapError(place, xy, bounds=())
-            nearest = nearest_place(space_of(replace(problem, clear_start=False)), xy)
+            space = space_of(replace(problem, clear_start=False))
+            nearest = nearest_place(space, xy, place=place)
             raise OutsideMapError(place, xy, bounds=tuple(grid.bounds().tolist()), nearest=nearest)
 
 
@@ -97,8 +104,13 @@ def check_space(space: Space, place: Place, pose: Pose, *, headings: bool = Fals
     Raises
     ------
     NonFreeError, UnknownSpaceError
+    ProblemError
+        A place beyond the part of a large map that is planned on.
     """
     xy, yaw = _place_and_yaw(space, pose, headings=headings)
+    _check_in_window(space, place, xy)
+    if _fits(space, space.blocked, xy, yaw):
+        return
     cell = tuple(np.floor(space.to_cells(xy)[0]).astype(np.int64)[::-1])
     unknown = space.blocked & ~space.nonfree
     checks = [(space.nonfree, NonFreeError), (unknown, UnknownSpaceError)]
@@ -111,18 +123,66 @@ def check_space(space: Space, place: Place, pose: Pose, *, headings: bool = Fals
                 xy,
                 clearance=space.clearance_of(xy, to=blocked),
                 needed=space.radius,
-                nearest=nearest_place(space, xy, yaw=yaw),
+                nearest=nearest_place(space, xy, place=place, yaw=yaw),
                 yaw=yaw,
             )
 
 
-def nearest_place(space: Space, xy: Point, *, yaw: float | None = None) -> Point | None:
+def check_start_is_known(space: Space) -> None:
+    """Check that the start, from which no route was found, is no island in unknown space.
+
+    The unknown cells near the start count as free. Where unknown cells alone keep even a point in
+    there, the start lies in unknown space, and is not fenced in.
+
+    Parameters
+    ----------
+    space : Costmap or Voxels
+
+    Raises
+    ------
+    UnknownSpaceError
+    """
+    xy = space.problem.start_xy
+    parts, _ = ndimage.label(~space.blocked)
+    part = parts[tuple(space.window.world_to_cell(xy)[0])]
+    island: Bools = (parts == part) & (part > 0)
+    unknown = space.blocked & ~space.nonfree
+    ends_in_unknown = (ndimage.binary_dilation(island) & unknown).any()
+    if ends_in_unknown and not (island & ~space.cleared).any():
+        raise UnknownSpaceError(
+            "start",
+            xy,
+            clearance=space.clearance_of(xy, to=unknown | space.cleared),
+            needed=space.radius,
+            nearest=nearest_place(space, xy, place="start"),
+        )
+
+
+def nearest_place(
+    space: Space, xy: Point, *, place: Place, yaw: float | None = None
+) -> Point | None:
     """Return the cell centre nearest to a place where the footprint fits, or None [m, map].
 
-    With a yaw [rad], the outline fits that is turned so; else, the disc around it.
+    It is one from which one gets somewhere. Of places for a start, only those count from which
+    the goal can be reached, and the reverse. Where the other end is in no place for the footprint
+    itself, only those in the largest connected part of the map count: a problem whose start and
+    goal are both replaced by their nearest places has a route.
+
+    Parameters
+    ----------
+    space : Costmap or Voxels
+    xy : tuple of float [m, map]
+    place : {"start", "goal"}
+        Which end of the problem the place is.
+    yaw : float, optional [rad]
+        The outline fits that is turned so; unless given, the disc around it. Which places an
+        outline can drive between isn't worked out: those count that base_link can.
     """
-    open_cells = space.stand if yaw is None else ~space.blocked
-    centres: Floats = space.window.cell_to_world(np.argwhere(open_cells))
+    problem = space.problem
+    free = space.stand if yaw is None else ~space.blocked
+    other = problem.goal_xy if place == "start" else problem.start_xy
+    cells = np.argwhere(_part_around(space, free, other))
+    centres: Floats = space.window.cell_to_world(cells)
     away = np.hypot.reduce(centres - xy, axis=1)
     if yaw is None:
         return tuple(centres[away.argmin()].tolist()) if len(away) else None
@@ -131,6 +191,35 @@ def nearest_place(space: Space, xy: Point, *, yaw: float | None = None) -> Point
         if _fits(space, space.blocked, centre, yaw):
             return centre
     return None
+
+
+def _part_around(space: Space, free: Bools, xy: Point) -> Bools:
+    """Return the cells that are connected to those around a place; else the largest part.
+
+    Moves lead over the sides of cells, as all cells that a diagonal move spans are free.
+    """
+    parts, count = ndimage.label(free)
+    position = space.to_cells(xy)[0][::-1] - 0.5
+    low = np.clip(np.floor(position), 0, free.shape).astype(np.int64)
+    high = np.clip(np.ceil(position) + 1, 0, free.shape).astype(np.int64)
+    around = np.unique(parts[tuple(map(slice, low, high))])
+    around = around[around > 0]
+    if len(around) == 0 and count > 0:
+        around = np.array([1 + np.bincount(parts.ravel())[1:].argmax()])
+    part: Bools = np.isin(parts, around)
+    return part
+
+
+def _check_in_window(space: Space, place: Place, xy: Point) -> None:
+    """Check that a place is on the part of the map that is planned on."""
+    window = space.window
+    if not window.contains(window.world_to_cell(xy))[0]:
+        raise ProblemError(
+            place,
+            "a place on the part of the map that is planned on, as the whole has too many cells",
+            shown(xy),
+            hint="Plan to and from other parts on their own.",
+        )
 
 
 def _place_and_yaw(space: Space, pose: Pose, *, headings: bool) -> tuple[Point, float | None]:
@@ -144,13 +233,12 @@ def _fits(space: Space, blocked: Bools, xy: Point, yaw: float | None) -> bool:
     position = space.to_cells(xy)[0]
     if yaw is None or polygon is None:
         cell = tuple(np.floor(position).astype(np.int64)[::-1])
-        return (
-            not blocked[cell]
-            and space.clearance_of(xy, to=blocked, limit=space.radius) >= space.radius - SLACK
-        )
+        least = space.radius - slack_at(xy)
+        return not blocked[cell] and space.clearance_of(xy, to=blocked, limit=space.radius) >= least
     x, y = position.tolist()
-    corners = polygon / space.window.resolution
-    return bool(pose_clear(blocked, corners, x, y, math.cos(yaw), math.sin(yaw)))
+    size = space.window.resolution
+    touch = slack_at(xy) / size
+    return bool(pose_clear(blocked, polygon / size, x, y, math.cos(yaw), math.sin(yaw), touch))
 
 
 def space_of(problem: PlanningProblem) -> Costmap | Voxels:
@@ -159,12 +247,20 @@ def space_of(problem: PlanningProblem) -> Costmap | Voxels:
 
 
 def _touches_tile(problem: PlanningProblem, xy: Point, margin: float) -> bool:
+    """Whether a touched tile comes within a margin [m] of a place, up to rounding."""
     grid = problem.grid
     side = grid.tile_shape[0] * grid.resolution
-    position = (np.array(xy) - grid.origin) / side
-    for index, _ in grid.tiles():
-        first = np.array(index)[::-1]
+    position = ((np.array(xy) - grid.origin) / side)[::-1]
+    reach = (margin + rounding_at(xy)) / side
+    ranges = [
+        range(math.ceil(at - reach) - 1, math.floor(at + reach) + 1) for at in position.tolist()
+    ]
+    indices: Iterable[tuple[int, ...]] = product(*ranges)
+    if math.prod(map(len, ranges)) > MOST_LOOKUPS:
+        indices = (index for index, _ in grid.tiles())
+    for index in indices:
+        first = np.array(index)
         away = np.maximum(np.maximum(first - position, position - first - 1), 0.0)
-        if math.hypot(*away) * side <= margin:
+        if math.hypot(*away) <= reach and grid.has_tile(index):
             return True
     return False

@@ -167,8 +167,6 @@ class ARA:
         self.turn += 1
         self.first = self.turn
         self.state[:] = 0, FAR, -1, 0
-        if len(ends.targets) == 0:
-            return
         for row, col, cost in ends.sources.tolist():
             node = row * self.costmap.width + col
             self.labels[node] = cost, MARK * self.first + WAITS + ROOT

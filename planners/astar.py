@@ -118,8 +118,6 @@ class AStar:
         """Begin a query: put the sources on an empty heap."""
         self.query += 1
         state = np.array([0, FAR, -1, 0], dtype=np.int64)
-        if len(targets) == 0:
-            return state
         for row, col, cost in sources.tolist():
             node = row * self.costmap.width + col
             self.labels[node] = cost, MARK * self.query + ROOT

@@ -9,7 +9,6 @@ from typing import ClassVar
 import numpy as np
 
 from groundmap.arrays import Floats, Ints
-from planners.costmap import SLACK
 from planners.engine import SLICE, Clock, Found, Pose, SearchSettings
 from planners.kernels.astar import EXHAUSTED, FAR, FOUND, HEAP_FULL, ONE
 from planners.kernels.astar3d import (
@@ -25,7 +24,9 @@ from planners.kernels.astar3d import (
 )
 from planners.kernels.clearance3d import segment_clearance
 from planners.kernels.heap import push
+from planners.links import centres_around
 from planners.polyline import SAME, length_of
+from planners.rounding import rounding_at
 from planners.voxels import Voxels
 
 FIRST_ROOM = 1 << 14  # heap entries to begin with
@@ -80,8 +81,10 @@ class AStar3D:
         a, b = self.voxels.to_cells([start[:3], goal[:3]])
         if self._is_clear(a, b):
             return _found(np.array([start[:3], goal[:3]]), 0)
-        targets = self._joined(b)
-        state = self._seed(self._joined(a), targets)
+        sources, targets = self._joined(start), self._joined(goal)
+        if len(sources) == 0 or len(targets) == 0:
+            return None
+        state = self._seed(sources, targets)
         status = -1
         while status not in (FOUND, EXHAUSTED):
             clock.check(int(state[EXPANDED]))
@@ -98,8 +101,6 @@ class AStar3D:
         """Begin a query: put the sources on an empty heap."""
         self.query += 1
         state = np.array([0, FAR, -1, 0], dtype=np.int64)
-        if len(targets) == 0:
-            return state
         for layer, row, col, cost in sources.tolist():
             node = layer * self.slab + row * self.width + col
             self.labels[node] = cost, MARK * self.query + ROOT
@@ -123,12 +124,14 @@ class AStar3D:
             self.heap = np.concatenate([self.heap, np.empty_like(self.heap)])
         return status
 
-    def _joined(self, position: Floats) -> Ints:
+    def _joined(self, place: Pose) -> Ints:
         """Return layer, row, column of the padded voxels that a place is joined to, and the cost.
 
-        The place is in voxels.
+        The place is x, y and z [m, map].
         """
-        around = (range(math.floor(x - 0.5), math.ceil(x - 0.5) + 1) for x in position.tolist())
+        position = self.voxels.to_cells(place[:3])[0]
+        near = rounding_at(place[:3]) / self.voxels.window.resolution
+        around = (centres_around(x, near) for x in position.tolist())
         rows = []
         for x, y, z in itertools.product(*around):
             centre = np.array([x, y, z]) + 0.5
@@ -146,7 +149,7 @@ class AStar3D:
         box = tuple(slice(i, j + 1) for i, j in zip(low[::-1], high[::-1], strict=True))
         if blocked[box].any():
             return False
-        need = (self.voxels.radius - SLACK) / self.voxels.window.resolution
+        need = (self.voxels.radius - self.voxels.slack) / self.voxels.window.resolution
         return need <= 0 or segment_clearance(blocked, a, b, need) >= need
 
 
@@ -175,4 +178,4 @@ def _append(kept: list[Floats], point: Floats) -> None:
 
 
 def _same(a: Floats, b: Floats) -> bool:
-    return bool(np.abs(a - b).max() < SAME)
+    return bool(np.abs(a - b).max() < SAME + rounding_at(a, b))

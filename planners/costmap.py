@@ -13,14 +13,17 @@ from groundmap.arrays import Bools, Bytes, Floats, Ints, Ints32
 from groundmap.window import GridWindow
 from planners.costs import MAX_NON_OBSTACLE
 from planners.errors import ProblemError
+from planners.extent import padded_window
 from planners.kernels.astar import DIAGONAL, ONE
 from planners.kernels.clearance import line_clearance
 from planners.kernels.distance import NOWHERE, squared_distances
 from planners.lattice import allowed_moves, squared_need
-from planners.layers import Layers, cap, layers_of, metres, padded_window
+from planners.layers import Layers, cap, layers_of, metres
 from planners.problem import PlanningProblem
+from planners.rounding import slack_at
 
-SLACK = 5e-10  # [m] shortfall of clearance that is put down to the rounding of coordinates
+FIRST_REACH = 64  # [cells] around cells in which blocked ones are looked for at first
+MOST_COST = 2**30  # [cells] of a route: as much again is left for estimates and their weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +122,11 @@ class Costmap:
         return self.problem.radius
 
     @property
+    def slack(self) -> float:
+        """Shortfall of the radius that is put down to rounding, on lines from start to goal [m]."""
+        return slack_at(self.problem.start_xy, self.problem.goal_xy)
+
+    @property
     def width(self) -> int:
         """Cells in a row."""
         return int(self.blocked.shape[1])
@@ -146,10 +154,36 @@ class Costmap:
 
         The first row holds orthogonal moves, the second diagonal ones, in units of `ONE` a cell's
         side. Each half of a move is as dear as the cell it is in: both directions cost the same.
+
+        Raises
+        ------
+        ProblemError
+            A route could cost more than the integers of a search can hold.
         """
+        self._check_sums()
         factors = 1.0 + self.top * np.arange(2 * MAX_NON_OBSTACLE + 1) / (2.0 * MAX_NON_OBSTACLE)
         steps: Ints = np.rint(np.array([[ONE], [DIAGONAL]]) * factors).astype(np.int64)
         return steps
+
+    def _check_sums(self) -> None:
+        """Check that no route can cost more than `MOST_COST`.
+
+        A route visits a cell once, by two halves of moves that are as dear as the cell.
+        """
+        most = MOST_COST * ONE / DIAGONAL
+        if self.stand.size * (1.0 + self.top) <= most:
+            return
+        factors = 1.0 + self.top * np.arange(MAX_NON_OBSTACLE + 1) / MAX_NON_OBSTACLE
+        counts = np.bincount(self.costs[self.stand], minlength=len(factors))
+        total = float(counts @ factors)
+        if total > most:
+            raise ProblemError(
+                "costs",
+                f"weights with which the {counts.sum()} free cells cost as much as {most:.3g} "
+                "plain ones at most",
+                f"{total:.3g}",
+                hint="Give smaller weights, or map with larger cells.",
+            )
 
     @cached_property
     def stand(self) -> Bools:
@@ -177,8 +211,22 @@ class Costmap:
 
     def clearance_at(self, cells: Ints) -> Floats:
         """Return the clearance of cell centres [row, col], shape (n,) [m]."""
-        at: Floats = self.clearance[tuple(cells.T)]
-        return at
+        known = "all_squared" in vars(self)
+        squared = self.all_squared[tuple(cells.T)] if known else self._squared_at(cells)
+        return metres(squared, self.window.resolution)
+
+    def _squared_at(self, cells: Ints) -> Ints32:
+        """Return `all_squared` at cells, worked out around them only as far as that is needed."""
+        first, last, reach = cells.min(axis=0), cells.max(axis=0) + 1, FIRST_REACH
+        while True:
+            low = np.maximum(first - reach, 0)
+            high = np.minimum(last + reach, self.blocked.shape)
+            part = squared_distances(self.blocked[_slices(low, high)], NOWHERE)
+            squared: Ints32 = part[tuple((cells - low).T)]
+            # What is left out begins more than `reach` cells away from all of the cells.
+            if squared.max() <= (2 * reach) ** 2 or part.shape == self.blocked.shape:
+                return squared
+            reach *= 4
 
     def to_cells(self, points: npt.ArrayLike) -> Floats:
         """Return positions [m, map] in cells from the window's outer corner, shape (n, 2)."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from groundmap.arrays import Bools
-from planners.answers import costmap_of
+from planners.answers import check_start_is_known, costmap_of
 from planners.costmap import Costmap
 from planners.errors import EnclosedError
 from planners.fields import reachable
@@ -26,10 +26,16 @@ def enclosed(costmap: Costmap, *, needed: float | None = None) -> EnclosedError:
     needed : float, optional [m]
         Width of the disc within the footprint, for planners that heed its heading; unless told,
         that of the disc that holds it however it is turned.
+
+    Raises
+    ------
+    UnknownSpaceError
+        The start is an island in unknown space.
     """
     problem, resolution = costmap.problem, costmap.window.resolution
     radius = costmap.radius if needed is None else needed / 2.0
     from_start = reachable(costmap, problem.start_xy, radius=radius)
+    check_start_is_known(costmap)
     from_goal = reachable(costmap, problem.goal_xy, radius=radius)
     place: Place = "start" if from_start.sum() < from_goal.sum() else "goal"
     fenced = from_start if place == "start" else from_goal

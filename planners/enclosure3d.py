@@ -8,19 +8,27 @@ import numpy as np
 from scipy import ndimage
 
 from groundmap.arrays import Bools
+from planners.answers import check_start_is_known
 from planners.errors import EnclosedError
 from planners.voxels import Voxels
 from planners.wording import Place, Point
 
 
 def enclosed_3d(voxels: Voxels) -> EnclosedError:
-    """Return the exception that says why start and goal are not joined."""
+    """Return the exception that says why start and goal are not joined.
+
+    Raises
+    ------
+    UnknownSpaceError
+        The start is an island in unknown space.
+    """
     problem, resolution = voxels.problem, voxels.window.resolution
     # All voxels of a move's box must be free: whoever gets anywhere gets there over faces.
     parts, _ = ndimage.label(voxels.stand)
     from_start, from_goal = (
         _around(voxels, parts, xyz) for xyz in (problem.start_xy, problem.goal_xy)
     )
+    check_start_is_known(voxels)
     place: Place = "start" if from_start.sum() < from_goal.sum() else "goal"
     fenced = from_start if place == "start" else from_goal
     centres = voxels.window.cell_to_world(np.argwhere(from_start))

@@ -12,10 +12,15 @@ from planners.costs import MAX_NON_OBSTACLE
 from planners.kernels.astar import ONE
 from planners.links import Links, is_clear, links
 from planners.polyline import merged
+from planners.rounding import slack_at
 
 
 class Ends(NamedTuple):
-    """Where searches begin and end."""
+    """Where searches begin and end.
+
+    Where start or goal is joined to no cell, no cell-to-cell route exists: then both sources and
+    targets are empty, and a search that begins with the sources ends at once.
+    """
 
     sources: Ints  #: shape (n, 3): row, column, cost from the start
     targets: Ints  #: shape (m, 3): row, column, cost to the goal
@@ -33,12 +38,17 @@ def ends_of(costmap: Costmap, start: tuple[float, ...], goal: tuple[float, ...])
     """
     (ax, ay), (bx, by) = costmap.to_cells([start[:2], goal[:2]]).tolist()
     radius = costmap.radius
-    return Ends(
-        _with_costs(costmap, links(costmap, (start[0], start[1]), radius=radius)),
-        _with_costs(costmap, links(costmap, (goal[0], goal[1]), radius=radius)),
-        (costmap.uniform or start[:2] == goal[:2])
-        and is_clear(costmap, (ax, ay), (bx, by), radius=radius),
+    sources, targets = (
+        _with_costs(costmap, links(costmap, (place[0], place[1]), radius=radius))
+        for place in (start, goal)
     )
+    if len(sources) == 0 or len(targets) == 0:
+        sources, targets = sources[:0], targets[:0]
+    slack = slack_at(start[:2], goal[:2])
+    direct = (costmap.uniform or start[:2] == goal[:2]) and is_clear(
+        costmap, (ax, ay), (bx, by), radius=radius - slack
+    )
+    return Ends(sources, targets, direct)
 
 
 def waypoints_through(

@@ -120,7 +120,7 @@ class HybridAStar:
         size = costmap.window.resolution
         footprint = costmap.problem.shape
         self.ground = ground_of(costmap)
-        self.shape = shape_of(footprint, size)
+        self.shape = shape_of(footprint, size, slack=costmap.slack)
         self.field = field_of(costmap, footprint)
         self.prices = Prices(costmap.costs, factors_of(costmap))
         self.nodes = empty_nodes(FIRST_ROOM)

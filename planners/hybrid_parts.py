@@ -15,6 +15,7 @@ from planners.kernels.footprint import Ground, Shape
 from planners.kernels.hybrid import Nodes, Shot
 from planners.kernels.hybrid_field import BUCKETS, Field
 from planners.lattice import allowed_moves
+from planners.rounding import SLACK
 
 MITRE_LIMIT = 5.0  # of shapely and others that grow outlines: sharper corners are cut off
 BULGE = 1e-3  # [m] how far the footprint may leave the hulls of the poses it is checked at
@@ -27,8 +28,11 @@ def ground_of(costmap: Costmap) -> Ground:
     return Ground(costmap.blocked, before, costmap.clearance / costmap.window.resolution)
 
 
-def shape_of(footprint: Footprint, size: float) -> Shape:
-    """Return a footprint in cells of a side of `size` [m]."""
+def shape_of(footprint: Footprint, size: float, *, slack: float = SLACK) -> Shape:
+    """Return a footprint in cells of a side of `size` [m].
+
+    `slack` [m] is the overlap that is put down to rounding.
+    """
     parts = [part / size for part in footprint.convex_parts()]
     radius = footprint.radius / size
     return Shape(
@@ -40,6 +44,7 @@ def shape_of(footprint: Footprint, size: float) -> Shape:
         spike=max(map(_spike, parts), default=1.0),
         inscribed=footprint.inscribed_radius / size,
         bulge=BULGE / size,
+        touch=slack / size,
     )
 
 

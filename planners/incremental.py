@@ -15,8 +15,9 @@ from planners.answers import check_on_map
 from planners.costmap import Costmap, whole_cells
 from planners.dstar_lite import DStarLite, DStarLiteSettings
 from planners.errors import ProblemError
-from planners.layers import EDGE, padded_bounds
+from planners.extent import padded_bounds
 from planners.problem import PlanningProblem
+from planners.rounding import slack_at
 from planners.route import Route
 from planners.solve import solve
 from planners.wording import Point
@@ -153,7 +154,8 @@ def _unknown_cells(costmap: Costmap) -> Ints:
     """Return cells near what is cleared, and the ends', if unknown or beyond the window."""
     problem, window = costmap.problem, costmap.window
     # A little more than the radius: squares that only touch it are cleared, too.
-    reach = problem.clear_radius + 2.0 * EDGE if problem.clear_start else 0.0
+    slack = slack_at(problem.clear_place)
+    reach = problem.clear_radius + 2.0 * slack if problem.clear_start else 0.0
     corners = [np.array(problem.clear_place) - reach, np.array(problem.clear_place) + reach]
     first, last = window.world_to_cell(corners)
     around = np.argwhere(np.ones(last - first + 1)) + first

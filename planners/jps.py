@@ -82,7 +82,7 @@ class JPS:
         if self.jumps is None:
             self.jumps = self.look_up()
         state = self._seed(ends)
-        status = EXHAUSTED if len(ends.targets) == 0 else -1
+        status = -1
         while status not in (FOUND, EXHAUSTED):
             clock.check(int(state[EXPANDED]))
             status = self._advance(self.jumps, ends.targets, state)

@@ -14,13 +14,10 @@ from planners.costs import (
     NO_INFORMATION,
     cell_costs,
 )
-from planners.errors import ProblemError
 from planners.kernels.distance import NOWHERE, squared_distances
 from planners.lattice import squared_need
 from planners.problem import PlanningProblem
-
-MOST_CELLS = 2**25  # of a costmap: what is held of it takes about 50 bytes for each
-EDGE = 5e-10  # [m] squares farther by less come within the clear radius, up to rounding
+from planners.rounding import slack_at
 
 
 class Layers(NamedTuple):
@@ -41,14 +38,17 @@ def layers_of(problem: PlanningProblem, window: GridWindow) -> Layers:
     free = (states == CellState.FREE) | cleared
     blocked = ~free if problem.avoids_unknown else nonfree
     squared = squared_distances(blocked, cap(problem))
-    costs = cell_costs(
-        problem.costs,
-        metres(squared, window.resolution),
-        window.confidence,
-        free,
-        radius=problem.radius,
-        penalise=problem.unknown == "penalise",
-    )
+    costs = np.zeros(squared.shape, dtype=np.uint8)
+    penalise = problem.unknown == "penalise"
+    if problem.costs.top(penalise=penalise) > 0:
+        costs = cell_costs(
+            problem.costs,
+            metres(squared, window.resolution),
+            window.confidence,
+            free,
+            radius=problem.radius,
+            penalise=penalise,
+        )
     costs[squared < squared_need(problem.radius, window.resolution)] = INSCRIBED_INFLATED_OBSTACLE
     costs[blocked] = NO_INFORMATION
     costs[nonfree] = LETHAL_OBSTACLE
@@ -66,56 +66,20 @@ def metres(squared: Ints32, resolution: float) -> Floats:
     return np.where(squared == NOWHERE, np.inf, np.sqrt(squared) * (resolution / 2.0))
 
 
-def padded_window(problem: PlanningProblem) -> GridWindow:
-    """Return the touched tiles, the cleared start, and a ring of cells around them, in 2-D or 3-D.
-
-    Raises
-    ------
-    ProblemError
-        More than `MOST_CELLS` cells.
-    """
-    return problem.grid.window(padded_bounds(problem))
-
-
-def padded_bounds(problem: PlanningProblem) -> Floats:
-    """Return the box of `padded_window`: lower then upper corner [m, map]."""
-    grid = problem.grid
-    lower, upper = grid.bounds().reshape(2, -1)
-    mapped = float(np.prod((upper - lower) / grid.resolution))
-    if mapped > MOST_CELLS:
-        raise ProblemError(
-            "grid",
-            f"a box of {MOST_CELLS} cells around the touched tiles at most",
-            f"{mapped:.3g}",
-            hint="Map with larger cells.",
-        )
-    if problem.clear_start:
-        start = np.array(problem.clear_place)
-        lower = np.minimum(lower, start - problem.clear_radius)
-        upper = np.maximum(upper, start + problem.clear_radius)
-    cells = float(np.prod((upper - lower) / grid.resolution))
-    if cells > MOST_CELLS:
-        raise ProblemError(
-            "footprint" if problem.cleared_at is None else "cleared_at",
-            f"one that leaves {MOST_CELLS} cells of map and cleared start at most",
-            f"{problem.clear_radius:g} m around {problem.clear_place}, which makes {cells:.3g}",
-            hint="Give a smaller footprint or clear_start_radius, or map with larger cells.",
-        )
-    # One cell and a half: borders that rounding moves by a cell must not swallow the ring.
-    ring = 1.5 * grid.resolution
-    return np.concatenate([lower - ring, upper + ring])
-
-
 def near_start(problem: PlanningProblem, window: GridWindow) -> Bools:
     """Return which cells' squares (cubes) come within the clear radius of the cleared place."""
-    shape = window.count.shape
+    near = np.zeros(window.count.shape, dtype=np.bool_)
     if not problem.clear_start:
-        return np.zeros(shape, dtype=np.bool_)
-    position = (np.array(problem.clear_place) - window.origin) / window.resolution
-    squared = np.zeros((1,) * len(shape))
-    for axis, (length, at) in enumerate(zip(shape, position[::-1], strict=True)):
-        first = np.arange(length)
-        gaps = np.maximum(np.maximum(first - at, at - first - 1), 0.0)
-        squared = squared + np.expand_dims(gaps**2, [k for k in range(len(shape)) if k != axis])
-    near: Bools = np.sqrt(squared) * window.resolution <= problem.clear_radius + EDGE
+        return near
+    position = ((np.array(problem.clear_place) - window.origin) / window.resolution)[::-1]
+    reach = problem.clear_radius + slack_at(problem.clear_place)
+    cells = reach / window.resolution + 1.0
+    first = np.clip(np.floor(position - cells), 0, near.shape).astype(np.int64)
+    last = np.clip(np.ceil(position + cells), 0, near.shape).astype(np.int64)
+    squared = np.zeros((1,) * near.ndim)
+    for axis, at in enumerate(position):
+        lower = np.arange(first[axis], last[axis])
+        gaps = np.maximum(np.maximum(lower - at, at - lower - 1), 0.0)
+        squared = squared + np.expand_dims(gaps**2, [k for k in range(near.ndim) if k != axis])
+    near[tuple(map(slice, first, last))] = np.sqrt(squared) * window.resolution <= reach
     return near

@@ -25,6 +25,7 @@ from planners.kernels.polyanya_nodes import (
     add,
 )
 from planners.mesh import NavigationMesh
+from planners.rounding import rounding_at
 
 FIRST_ROOM = 1 << 12  # search nodes to begin with
 MOST_ENDS = 4  # cells that a place is joined to
@@ -124,7 +125,8 @@ class Polyanya:
         """Return the place itself where the mesh holds it, else the centres it is joined to."""
         xy = self.costmap.to_cells(place[:2])[0] - 0.5
         snapped = np.rint(xy)
-        x, y = np.where(np.abs(xy - snapped) < SNAP, snapped, xy).tolist()
+        near = SNAP + rounding_at(place[:2]) / self.costmap.window.resolution
+        x, y = np.where(np.abs(xy - snapped) < near, snapped, xy).tolist()
         if self.mesh.holds(x, y):
             return Places(np.array([[x, y, 0.0]]), itself=True)
         return Places(joined[:, [1, 0, 2]] / np.array([1.0, 1.0, ONE]), itself=False)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from groundmap.arrays import Floats, Ints
+from planners.rounding import rounding_at
 
 SAME = 1e-10  # [m] inner points that near their predecessor are the same point, up to rounding
 
@@ -76,7 +77,7 @@ def merged(points: Floats) -> Floats:
     >>> merged(np.array([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0], [3.0, 0.0], [4.0, 1.0]])).tolist()
     [[0.0, 0.0], [3.0, 0.0], [4.0, 1.0]]
     """
-    differs = np.abs(np.diff(points, axis=0)).max(axis=1) >= SAME
+    differs = np.abs(np.diff(points, axis=0)).max(axis=1) >= SAME + rounding_at(points)
     # Inner points that repeat their predecessor go, and those that the last point repeats.
     kept = np.concatenate([points[:1], points[1:-1][differs[:-1]]])
     if len(kept) > 1 and not differs[-1]:

@@ -41,6 +41,8 @@ class PlanningProblem:
         What else makes a metre dear; nothing unless told.
     clear_start : bool, default True
         Whether *unknown* cells near the start count as free; non-free and contested ones never do.
+        `Route.start_unknown_area` says how many of them a route needs, `Route.known_clearance` how
+        near it comes to them.
     clear_start_radius : float [m], optional
         Cells are near whose square comes within this distance of the start. Unless told it is the
         footprint's radius and half its width: of a disc, twice the radius. (What a forward camera

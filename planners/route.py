@@ -48,6 +48,10 @@ class Route:
     min_clearance : float [m]
         Distance of the line to the nearest cell it must not touch (its square), exact; infinite
         on a map without such cells.
+    known_clearance : float [m]
+        As `min_clearance`, but to the unknown cells near the start as well that count as free:
+        what is kept for sure. It is smaller where the line comes near to such cells, and 0 where
+        it crosses one.
     mean_clearance : float [m]
         Mean along the line of the clearance at the centres of the cells it crosses.
     min_confidence, mean_confidence : float
@@ -79,6 +83,7 @@ class Route:
     cost: float
     bound: float | None
     min_clearance: float
+    known_clearance: float
     mean_clearance: float
     min_confidence: float
     mean_confidence: float
@@ -107,7 +112,7 @@ class Route:
         at = tuple(line.cells.T)
         sureness = -space.window.confidence[at].astype(np.float64)
         unknown = space.window.count[at] == 0
-        length = length_of(waypoints)
+        length, clearance = length_of(waypoints), space.clearance_of(waypoints)
         headings = found.headings
         return cls(
             waypoints=waypoints,
@@ -115,7 +120,8 @@ class Route:
             length=length,
             cost=length if found.cost is None else found.cost,
             bound=found.bound,
-            min_clearance=space.clearance_of(waypoints),
+            min_clearance=clearance,
+            known_clearance=_known_clearance(space, waypoints, clearance),
             mean_clearance=_mean(space.clearance_at(line.cells), line.lengths),
             min_confidence=float(sureness.min()) + 0.0,  # + 0.0: an unknown cell's -0.0 is 0.0
             mean_confidence=_mean(sureness, line.lengths) + 0.0,
@@ -134,7 +140,7 @@ class Route:
         values = {name: getattr(self, name) for name in names}
         values["waypoints"] = self.waypoints.tolist()
         values["headings"] = self.headings.tolist()
-        for name in ("min_clearance", "mean_clearance"):
+        for name in ("min_clearance", "known_clearance", "mean_clearance"):
             values[name] = values[name] if math.isfinite(values[name]) else None
         return values
 
@@ -272,6 +278,13 @@ def _mean(values: Floats, weights: Floats) -> float:
     if weights.sum() == 0:
         return float(values[0])
     return float(np.average(values, weights=weights))
+
+
+def _known_clearance(space: Space, waypoints: Floats, clearance: float) -> float:
+    """Return the distance to what is blocked or unknown but cleared, given that to the former."""
+    if not space.problem.avoids_unknown or not space.cleared.any():
+        return clearance
+    return min(clearance, space.clearance_of(waypoints, to=space.cleared, limit=clearance))
 
 
 def _start_unknown_area(space: Space, found: Found, line: Crossed) -> float:

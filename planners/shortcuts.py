@@ -9,13 +9,14 @@ import numpy as np
 
 from groundmap.arrays import Floats, Ints
 from planners.answers import answer
-from planners.costmap import SLACK, Costmap
+from planners.costmap import Costmap
 from planners.costs import MAX_NON_OBSTACLE
 from planners.engine import Found
 from planners.errors import ProblemError
 from planners.kernels.shortcut import best_chain, leg_cost
 from planners.polyline import length_of, merged
 from planners.problem import PlanningProblem
+from planners.rounding import rounding_at
 from planners.route import Route
 
 AHEAD, AHEAD_DENSE = 128, 16  # points that a leg may skip: bounds the time on routes of many turns
@@ -94,7 +95,7 @@ def checked(problem: PlanningProblem, route: Route) -> Costmap:
     if problem.grid.ndim != 2:
         raise ProblemError("problem", "one on a 2-D map", f"one on a {problem.grid.ndim}-D map")
     ends = np.array([problem.start_xy, problem.goal_xy])
-    if np.abs(route.waypoints[[0, -1]] - ends).max() > SAME_PLACE:
+    if np.abs(route.waypoints[[0, -1]] - ends).max() > SAME_PLACE + rounding_at(ends):
         got = " to ".join(f"({x:.2f}, {y:.2f})" for x, y in route.waypoints[[0, -1]].tolist())
         raise ProblemError("route", "one from the problem's start to its goal", f"one from {got}")
     if _decides_on_headings(route):
@@ -106,7 +107,7 @@ def checked(problem: PlanningProblem, route: Route) -> Costmap:
         )
     costmap = Costmap.of(problem)
     kept = costmap.clearance_of(route.waypoints)
-    if kept < costmap.radius - 2.0 * SLACK:
+    if kept < costmap.radius - 2.0 * costmap.slack:
         raise ProblemError(
             "route",
             f"one that keeps {costmap.radius:.2f} m, the radius of a disc around the footprint",
@@ -162,7 +163,7 @@ def _passed(
     resolution = costmap.window.resolution
     places = _graded(line, resolution) if dense else [np.empty(0)] * (len(line) - 1)
     points, begins, ends = _with_points(line, places)
-    need = max(costmap.radius - SLACK, SLACK) / resolution
+    need = max(costmap.radius - costmap.slack, costmap.slack) / resolution
     wanted = max(need, (0.0 if clearance is None else clearance) / resolution)
     chain = best_chain(
         costmap.blocked,
@@ -203,6 +204,6 @@ def _with_points(line: Floats, places: list[Floats]) -> tuple[Floats, Ints, Ints
 def _decides_on_headings(route: Route) -> bool:
     """Whether the headings are others than those along the line."""
     steps = np.diff(route.waypoints, axis=0)
-    moved = np.hypot(*steps.T) > SAME_PLACE
+    moved = np.hypot(*steps.T) > SAME_PLACE + rounding_at(route.waypoints)
     off = route.headings[:-1] - np.arctan2(steps[:, 1], steps[:, 0])
     return bool((np.abs(np.angle(np.exp(1j * off[moved]))) > TURNED).any())

@@ -11,7 +11,7 @@ import numpy as np
 
 from groundmap.arrays import Floats, as_floats, check_finite, is_number
 from planners.answers import answer
-from planners.costmap import SLACK, Costmap
+from planners.costmap import Costmap
 from planners.engine import Clock, Found
 from planners.errors import ProblemError, SmoothingError
 from planners.kernels.smooth import free_discs, relax
@@ -191,7 +191,7 @@ def _bent(costmap: Costmap, line: Floats, goals: _Goals, clock: Clock) -> tuple[
     bounds, on either side; so each bound that was missed is a little stricter in the next round.
     """
     size, radius = costmap.window.resolution, goals.turning_radius
-    need = max(costmap.radius - SLACK, SLACK)
+    need = max(costmap.radius - costmap.slack, costmap.slack)
     low, high = (1 if yaw is None else 2 for yaw in goals.yaws)  # points that are given
     strictness = FIRST
     # Between two points that keep a distance, their chord may come nearer to a corner.

@@ -50,6 +50,11 @@ class Space(Protocol):
         """Distance that the footprint's centre keeps from what is blocked [m]."""
         ...
 
+    @property
+    def slack(self) -> float:
+        """Shortfall of that distance that is put down to rounding, from start to goal [m]."""
+        ...
+
     def to_cells(self, points: npt.ArrayLike) -> Floats:
         """Return positions in cells."""
         ...

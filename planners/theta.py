@@ -103,11 +103,8 @@ class Theta:
     def _seed(self, sources: Floats, targets: Floats) -> Ints:
         self.query += 1
         state = np.array([0, FAR, -1, 0], dtype=np.int64)
-        if len(targets) > 0:
-            width = self.costmap.width
-            state[SIZE] = seed(
-                sources, targets, width, self.costs, self.marks, self.query, self.heap
-            )
+        width = self.costmap.width
+        state[SIZE] = seed(sources, targets, width, self.costs, self.marks, self.query, self.heap)
         return state
 
     def _advance(self, targets: Floats, state: Ints) -> int:

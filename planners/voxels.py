@@ -12,10 +12,12 @@ import numpy.typing as npt
 from groundmap.arrays import Bools, Floats, Ints, Ints32
 from groundmap.window import CellState, GridWindow
 from planners.errors import ProblemError
+from planners.extent import padded_window
 from planners.kernels.clearance3d import line_clearance, segment_clearance
 from planners.lattice import squared_need
-from planners.layers import near_start, padded_window
+from planners.layers import near_start
 from planners.problem import PlanningProblem
+from planners.rounding import slack_at
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +75,11 @@ class Voxels:
     def radius(self) -> float:
         """Distance that the footprint's centre keeps from what is blocked [m]."""
         return self.problem.radius
+
+    @property
+    def slack(self) -> float:
+        """Shortfall of the radius that is put down to rounding, on lines from start to goal [m]."""
+        return slack_at(self.problem.start_xy, self.problem.goal_xy)
 
     @cached_property
     def stand(self) -> Bools:

@@ -23,7 +23,7 @@ from oracles_planning import (
     move_allowed,
     union_of_squares,
 )
-from planners import CostSettings, PlanningProblem, ProblemError
+from planners import CostSettings, PlanningProblem, ProblemError, distance_field, plan
 from planners.costmap import Costmap
 from planners.kernels.astar import COLS, ROWS
 from planners.kernels.distance import NOWHERE, squared_distances
@@ -251,3 +251,80 @@ def test_changed_cells_are_rows_of_two_whole_numbers(changed: Any) -> None:
     problem = PlanningProblem(grid_of(free_field(8, 8)), start=(4, 4), goal=(4, 4), footprint=1.0)
     with pytest.raises(ProblemError, match=r"changed: expected whole numbers \[row, col\]"):
         Costmap.of(problem).updated(changed)
+
+
+# Sums
+
+
+DEAREST = CostSettings(
+    clearance_weight=1000.0,
+    confidence_weight=1000.0,
+    inflation_radius=100.0,
+    cost_scaling_factor=0.0,
+)
+
+
+def serpentine(side: int) -> PlanningProblem:
+    """Return the problem to drive all of a corridor, one cell wide, that fills a square map.
+
+    All of it is at the walls and hardly known to be free: a cell costs 250 of 252.
+    """
+    assert side % 4 == 3
+    z = np.full((side, side), BLOCKED, dtype=np.float32)
+    z[::2] = z[1::4, -1] = z[3::4, 0] = -1 / 64
+    return PlanningProblem(
+        grid_of(z),
+        start=(0.5, 0.5),
+        goal=(0.5, side - 0.5),
+        footprint=0.0,
+        clear_start=False,
+        costs=DEAREST,
+    )
+
+
+@pytest.mark.parametrize("planner", ["astar", "dijkstra", "weighted_astar", "ara", "dstar_lite"])
+def test_the_sums_of_the_dearest_metres_are_exact(planner: str) -> None:
+    route = plan(serpentine(99), planner)
+    assert route.length > 99 * 49
+    factor = 1.0 + 2000.0 * 250 / 252
+    assert route.cost == pytest.approx(factor * route.length, rel=1e-9)
+
+
+@pytest.mark.parametrize("planner", ["astar", "dijkstra", "weighted_astar", "ara", "dstar_lite"])
+def test_weights_whose_sums_would_overflow_are_refused(planner: str) -> None:
+    # 1.1 million cells at 1985 each: more than the 2^31 cells that the integers hold.
+    with pytest.raises(
+        ProblemError, match=r"costs: expected weights with which the 1\d+ free cells"
+    ):
+        plan(serpentine(1499), planner)
+
+
+def test_a_distance_field_whose_sums_would_overflow_is_refused() -> None:
+    asked = serpentine(1499)
+    with pytest.raises(ProblemError, match="Give smaller weights"):
+        distance_field(asked, asked.start)
+
+
+def test_the_highest_weights_are_accepted_where_few_cells_are_dear() -> None:
+    few = CostSettings(clearance_weight=1000.0, inflation_radius=3.0)
+    asked = PlanningProblem(
+        grid_of(free_field(1024, 1024)),
+        start=(9.5, 9.5),
+        goal=(99.5, 9.5),
+        footprint=0.0,
+        costs=few,
+    )
+    assert plan(asked).cost == pytest.approx(90.0)
+
+
+@given(masks(side=12), st.integers(1, 4))
+@settings(max_examples=60)
+def test_the_clearance_of_few_cells_is_that_of_the_whole_map(blocked: Bools, reach: int) -> None:
+    z = np.where(blocked, BLOCKED, FREE)
+    asked = PlanningProblem(grid_of(z), start=(1, 1), goal=(1, 1), footprint=0.0, unknown="allow")
+    costmap, whole = Costmap.of(asked), Costmap.of(asked).clearance
+    cells = np.argwhere(~costmap.blocked)[:: 7 * reach]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("planners.costmap.FIRST_REACH", reach)
+        np.testing.assert_array_equal(costmap.clearance_at(cells), whole[tuple(cells.T)])
+    assert "all_squared" not in vars(costmap)

@@ -18,6 +18,7 @@ from planners.errors import ProblemError
 from planners.footprint import Footprint
 from planners.hybrid_parts import shape_of
 from planners.kernels.footprint import Ground, cuts, motion_clear, pose_clear
+from planners.rounding import SLACK
 from strategies import rngs
 
 SQUARE = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
@@ -173,7 +174,7 @@ def test_a_pose_is_clear_if_no_blocked_square_is_overlapped(rng: np.random.Gener
     placed = placed_at(shapely.Polygon(corners(footprint)), (x, y, yaw))
     overlap = placed.intersection(union_of_squares(blocked)).area
     assume(not 1e-12 < overlap < 1e-7)  # rounding decides
-    got = pose_clear(blocked, corners(footprint), x, y, math.cos(yaw), math.sin(yaw))
+    got = pose_clear(blocked, corners(footprint), x, y, math.cos(yaw), math.sin(yaw), SLACK)
     assert got == (overlap < 1e-9)
 
 

@@ -670,3 +670,10 @@ def test_a_file_with_a_wrong_bit_is_refused_or_loads_the_same(place: int, bit: i
             return
     assert contents(back) == contents(a_map())
     assert (back.resolution, back.frame, back.rule) == (0.1524, "straße 5", Capped(7))
+
+
+def test_a_tile_is_there_once_it_was_touched() -> None:
+    grid = ConfidenceGrid(resolution=1.0)
+    grid.fuse(np.array([-1, 70]), np.full((1, 1), -1.0, dtype=np.float32))
+    assert grid.has_tile((-1, 1))
+    assert not grid.has_tile((0, 1))

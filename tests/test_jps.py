@@ -17,10 +17,11 @@ from groundmap.io.movingai import read_movingai_map
 from groundmap.io.movingai_scen import read_movingai_scen
 from oracles_jps import jump, least_cost, may_step
 from oracles_planning import BLOCKED, FREE, free_field, grid_of
-from planners import PlanningProblem, ProblemError, TimeLimitError
+from planners import NoRouteError, PlanningProblem, ProblemError, TimeLimitError, plan
 from planners.astar import AStar, AStarSettings
 from planners.costmap import Costmap
 from planners.costs import CostSettings
+from planners.ends import ends_of
 from planners.jps import JPS, JPSPlus, JPSPlusSettings, JPSSettings, stops_of
 from planners.kernels.astar import (
     BEST,
@@ -281,3 +282,44 @@ def test_lengths_are_the_published_optima(name: str, plus: bool) -> None:
     for i in np.random.default_rng(0).permutation(len(rows))[:40]:
         start, goal = (np.array([[*cell, 0]]) for cell in (rows[i].start, rows[i].goal))
         assert search(start, goal).cost / ONE == pytest.approx(rows[i].length, abs=0.01)
+
+
+# Places off the centres
+
+
+def outcome(problem: PlanningProblem, planner: str) -> tuple[str, object]:
+    """Return the cost of a route, or why there is none."""
+    try:
+        return "cost", pytest.approx(plan(problem, planner).cost, rel=1e-12)
+    except NoRouteError as error:
+        return type(error).__name__, str(error)
+
+
+def speckled_problem(rng: np.random.Generator) -> PlanningProblem:
+    """Return a problem between places off the centres, where the footprint fits."""
+    while True:
+        side = int(rng.integers(6, 16))
+        z = np.where(rng.random((side, side)) < rng.choice([0.1, 0.25, 0.4]), BLOCKED, FREE)
+        cells = np.argwhere(z == FREE)
+        start, goal = cells[rng.integers(0, len(cells), 2), ::-1] + rng.random((2, 2))
+        radius = float(rng.choice([0.2, 0.45, 0.5, 0.6, 0.8]))
+        problem = PlanningProblem(grid_of(z), start=start, goal=goal, footprint=radius)
+        costmap = Costmap.of(problem)
+        if min(costmap.clearance_of(place) for place in (start, goal)) >= radius:
+            return problem
+
+
+@pytest.mark.parametrize("planner", ["jps", "jps+"])
+def test_places_off_the_centres_get_the_answers_of_astar(planner: str) -> None:
+    rng = np.random.default_rng(5)
+    plan(
+        PlanningProblem(grid_of(free_field(9, 9)), start=(2, 2), goal=(7, 5), footprint=0.5), "jps"
+    )
+    joins_nothing = 0
+    for _ in range(150):
+        problem = speckled_problem(rng)
+        assert outcome(problem, planner) == outcome(problem, "astar")
+        ends = ends_of(Costmap.of(problem), problem.start_xy, problem.goal_xy)
+        joins_nothing += len(ends.targets) == 0
+        assert (len(ends.sources) == 0) == (len(ends.targets) == 0)
+    assert joins_nothing >= 5

@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from groundmap.arrays import Floats
+from groundmap.arrays import Floats, Floats32
 from groundmap.errors import InputError
 from oracles_planning import BLOCKED, UNSEEN, free_field, grid_of
 from planners import PlanningProblem, Route, plan
@@ -27,6 +27,7 @@ KEYS = {
     "bound",
     "headings",
     "min_clearance",
+    "known_clearance",
     "min_confidence",
     "mean_confidence",
     "unknown_length",
@@ -175,3 +176,35 @@ def test_a_route_is_saved_as_its_name_ends_or_not_at_all(tmp_path: Path) -> None
     with pytest.raises(InputError, match=r"path: expected a name that ends in \.geojson, "):
         straight().save(tmp_path / "route.txt")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["route.geojson"]
+
+
+def test_the_known_clearance_counts_unknown_cells_that_were_cleared() -> None:
+    z = free_field(64, 64)
+    z[10, 10] = UNSEEN
+    ends = {"start": (9.3, 8.5), "goal": (40.5, 8.5)}
+    route = straight_over(z, **ends)
+    assert route.start_unknown_area == 0.0
+    assert route.known_clearance == pytest.approx(1.5)
+    assert route.min_clearance == 8.5
+    z[8, 9] = UNSEEN
+    assert straight_over(z, **ends).known_clearance == 0.0
+    assert straight_over(z, **ends).min_clearance == 8.5
+
+
+def test_without_cleared_cells_the_known_clearance_is_the_clearance() -> None:
+    z = free_field(64, 64)
+    z[30:32, 30:32] = UNSEEN
+    for options in ({}, {"unknown": "allow"}, {"clear_start": False}):
+        route = straight_over(z, **options)
+        assert route.known_clearance == route.min_clearance
+
+
+def straight_over(z: Floats32, **options: object) -> Route:
+    values = {"start": (10.5, 8.5), "goal": (40.5, 8.5), "footprint": 1.0} | options
+    return plan(PlanningProblem(grid_of(z), **values))  # type: ignore[arg-type]
+
+
+def test_a_route_without_blocked_cells_has_no_clearance_in_files() -> None:
+    z = free_field(64, 64)
+    values = straight_over(z, unknown="allow").to_dict()
+    assert values["min_clearance"] is values["known_clearance"] is None

@@ -177,7 +177,9 @@ def kernel_of(ways: Ways) -> Callable[..., bool]:
     """Return the check with copies of all its arrays."""
     body: list[Any] = [array.copy() for array in ways.body]
     if ways.space == "r2":
-        return partial(line_clear, body[0], body[2], SIZE, ways.costmap.radius / SIZE)
+        return partial(
+            line_clear, body[0], body[2], SIZE, ways.costmap.radius / SIZE, ways.shape.touch
+        )
     if ways.space == "se2":
         return partial(slide_clear, *body)
     return partial(curve_clear, ways.space == "dubins", *body)

@@ -20,6 +20,7 @@ from planners.audit3d import audit3d
 from planners.engine import Pose
 from planners.kernels.distance import NOWHERE
 from planners.kernels.sampling3d import all_squared_distances, line_clear
+from planners.rounding import SLACK
 from planners.sampling.ways3d import Ways3D
 from planners.voxels import Voxels, squared_distances
 from strategies import rngs
@@ -209,7 +210,7 @@ def test_the_kernel_answers_as_python_does() -> None:
     ways = ways_over(np.zeros((SIDE,) * 3, dtype=np.bool_), 0.5)
     a, b = (3.0, 3.0, 3.0), (6.0, 5.0, 4.0)
     assert ways.is_clear(*a, *b) is True  # OMPL's bindings take nothing else
-    assert line_clear.py_func(ways.squared, 0.5, 0.5, *a, *b)
+    assert line_clear.py_func(ways.squared, 0.5, 0.5, SLACK, *a, *b)
 
 
 # Regions

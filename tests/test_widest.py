@@ -106,7 +106,7 @@ class Graph:
 
     def shortest(self, clearance: float) -> float:
         """Return the length of the shortest way of a clearance."""
-        use = (self.clear >= clearance - 1e-9) & (self.lengths > 0)
+        use = self.clear >= clearance - 1e-9
         n = len(self.places)
         edges = (self.lengths[use], tuple(self.pairs[use].T))
         lengths = dijkstra(coo_array(edges, shape=(n, n)).tocsr(), directed=False, indices=n - 2)

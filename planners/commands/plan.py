@@ -71,6 +71,7 @@ def plan_command(
         bool,
         typer.Option(
             help="Count unknown cells near the start as free: of a disc, within twice its radius."
+            " known_clearance is the route's distance to these, too."
         ),
     ] = True,
     clearance_weight: Annotated[

@@ -18,8 +18,6 @@ from planners.kernels.clearance import segment_clearance
 from planners.kernels.curves import along
 from planners.kernels.hull import clipped, hull_clear, hull_of
 
-TOUCH = 5e-10  # [cells] overlap that is put down to rounding
-
 
 class Ground(NamedTuple):
     """The map, as these kernels read it."""
@@ -42,11 +40,18 @@ class Shape(NamedTuple):
     spike: float  #: how far the corners of an outline move out at most per distance it is grown
     inscribed: float  #: of the largest disc about the origin within it
     bulge: float  #: how far a motion may leave the hulls of the poses that it is cut into
+    touch: float  #: overlap that is put down to rounding
 
 
 @njit(cache=True, nogil=True)
 def pose_clear(
-    blocked: Bools, polygon: Floats, x: float, y: float, cosine: float, sine: float
+    blocked: Bools,
+    polygon: Floats,
+    x: float,
+    y: float,
+    cosine: float,
+    sine: float,
+    touch: float,
 ) -> bool:
     """Whether a simple polygon, concave ones too, placed at a pose overlaps no blocked square.
 
@@ -56,6 +61,8 @@ def pose_clear(
     polygon : ndarray, shape (n, 2) [cells, base_link]
     x, y, cosine, sine : float [cells]
         Where base_link is, and its yaw.
+    touch : float [cells]
+        Overlap that is put down to rounding.
 
     Notes
     -----
@@ -75,9 +82,9 @@ def pose_clear(
         for i in range(n):
             ax, ay = placed[i]
             bx, by = placed[i + 1]
-            left, right = clipped(ax, ay, bx, by, row + TOUCH, row + 1.0 - TOUCH)
+            left, right = clipped(ax, ay, bx, by, row + touch, row + 1.0 - touch)
             if left <= right:
-                first, last = math.floor(left + TOUCH), math.ceil(right - TOUCH) - 1
+                first, last = math.floor(left + touch), math.ceil(right - touch) - 1
                 for col in range(max(first, 0), min(last, cols - 1) + 1):
                     if blocked[row, col]:
                         return False
@@ -156,7 +163,7 @@ def motion_clear(
         bx, by, b = along(x, y, yaw, curvature, length * i / steps)
         if not within(ground.clearance, bx, by, 0.0):
             return False
-        if nearness(ground.clearance, bx, by)[1] < shape.inscribed - TOUCH:
+        if nearness(ground.clearance, bx, by)[1] < shape.inscribed - shape.touch:
             return False
         between = along(x, y, yaw, curvature, length * (i - 0.5) / steps)
         if not covered(ground.clearance, shape.discs, *between, slack) and not step_clear(
@@ -184,8 +191,8 @@ def step_clear(
     `grow` is added on all sides.
     """
     if len(shape.corners) == 0:
-        need = max(shape.radius + grow, 2.0 * TOUCH)
-        return segment_clearance(ground.blocked, ax, ay, bx, by, need) >= need - TOUCH
+        need = max(shape.radius + grow, 2.0 * shape.touch)
+        return segment_clearance(ground.blocked, ax, ay, bx, by, need) >= need - shape.touch
     cos_a, sin_a, cos_b, sin_b = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
     for part in range(len(shape.begins) - 1):
         first, last = shape.begins[part], shape.begins[part + 1]
@@ -196,7 +203,7 @@ def step_clear(
             points[k, 0], points[k, 1] = ax + cos_a * u - sin_a * v, ay + sin_a * u + cos_a * v
             points[k + 1, 0] = bx + cos_b * u - sin_b * v
             points[k + 1, 1] = by + sin_b * u + cos_b * v
-        if not hull_clear(ground.before, hull_of(points), grow - TOUCH):
+        if not hull_clear(ground.before, hull_of(points), grow - shape.touch):
             return False
     return True
 

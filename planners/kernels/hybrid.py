@@ -36,6 +36,7 @@ from planners.kernels.hybrid_motion import (
 SLICE_DONE, FOUND, EXHAUSTED, FULL = range(4)  # what `advance` returns
 SIZE, COUNT, EXPANDED, WAIT, BEST, LAST = range(6)  # entries of `state`
 STATE_SIZE = 6
+MOST = 2.0**30  # [cells] of a cost as a key
 HASH = 0x9E3779B97F4A7C15 - 2**64  # odd; the golden ratio spreads keys that are close together
 
 
@@ -57,6 +58,12 @@ class Shot(NamedTuple):
 
     lengths: Floats  #: shape (5,)
     turns: Ints  #: shape (5,)
+
+
+@njit(cache=True, nogil=True)
+def key_of(cost: float) -> int:
+    """Return a cost [cells] as an integer for the heap; all above `MOST` are alike."""
+    return round(min(cost, MOST) * ONE)
 
 
 @njit(cache=True, nogil=True)
@@ -90,7 +97,7 @@ def begin(
     nodes.costs[0], nodes.guesses[0], nodes.keys[0] = 0.0, guess, key
     nodes.parents[0], nodes.motions[0], nodes.closed[0] = ROOT, ROOT, False
     state[COUNT] = 1
-    state[SIZE] = push(heap, 0, round(drive.weight * guess * ONE), round(guess * ONE), 0)
+    state[SIZE] = push(heap, 0, key_of(drive.weight * guess), key_of(guess), 0)
     return state
 
 
@@ -212,8 +219,8 @@ def _try(
     nodes.poses[other, 0], nodes.poses[other, 1], nodes.poses[other, 2] = x, y, wrap(yaw)
     nodes.costs[other], nodes.guesses[other], nodes.keys[other] = cost, guess, key
     nodes.parents[other], nodes.motions[other], nodes.closed[other] = node, motion, False
-    total = round((cost + drive.weight * guess) * ONE)
-    state[SIZE] = push(heap, state[SIZE], total, round(guess * ONE), other)
+    total = key_of(cost + drive.weight * guess)
+    state[SIZE] = push(heap, state[SIZE], total, key_of(guess), other)
 
 
 @njit(cache=True, nogil=True)
@@ -251,7 +258,7 @@ def _shoot(
             )
             x, y, yaw = along(x, y, yaw, curvature, length / count)
     if total * ONE < state[BEST]:
-        state[BEST], state[LAST] = round(total * ONE), node
+        state[BEST], state[LAST] = key_of(total), node
         shot.lengths[:], shot.turns[:] = lengths, turns
 
 

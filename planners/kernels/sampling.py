@@ -16,7 +16,6 @@ from numba import njit
 from groundmap.arrays import Bools, Floats, Ints
 from planners.kernels.curves import SEGMENTS, along, dubins_word, reeds_shepp_word, wrap
 from planners.kernels.footprint import (
-    TOUCH,
     Ground,
     Shape,
     motion_clear,
@@ -28,7 +27,7 @@ from planners.kernels.sampling_lines import line_clear
 
 PIECE = 4.0  # [cells] curves are cut into motions of that length
 # What `Body.numbers` holds.
-SIZE, TURNING, RADIUS, ARM, SPIKE, INSCRIBED, BULGE = range(7)
+SIZE, TURNING, RADIUS, ARM, SPIKE, INSCRIBED, BULGE, TOUCH = range(8)
 
 
 class Body(NamedTuple):
@@ -40,7 +39,7 @@ class Body(NamedTuple):
     corners: Floats  #: as in `Shape` [cells]
     begins: Ints  #: as in `Shape`
     discs: Floats  #: as in `Shape` [cells]
-    numbers: Floats  #: shape (7,); a cell's side [m], the turning radius and `Shape`'s [cells]
+    numbers: Floats  #: shape (8,); a cell's side [m], the turning radius and `Shape`'s [cells]
 
 
 @njit(cache=True, nogil=True)
@@ -74,9 +73,11 @@ def slide_clear(
     ground, shape = Ground(blocked, before, clearance), _shape(corners, begins, discs, numbers)
     size, inscribed = numbers[SIZE], shape.inscribed
     if len(corners) == 0:  # it looks the same at every yaw
-        return line_clear(blocked, clearance, size, shape.radius, ax, ay, bx, by)
+        return line_clear(blocked, clearance, size, shape.radius, shape.touch, ax, ay, bx, by)
     # Most edges that aren't clear cross a wall, which the disc within the footprint finds sooner.
-    if inscribed > TOUCH and not line_clear(blocked, clearance, size, inscribed, ax, ay, bx, by):
+    if inscribed > shape.touch and not line_clear(
+        blocked, clearance, size, inscribed, shape.touch, ax, ay, bx, by
+    ):
         return False
     ax, ay, bx, by = ax / size, ay / size, bx / size, by / size
     if not (within(clearance, ax, ay, 0.0) and within(clearance, bx, by, 0.0)):
@@ -95,7 +96,7 @@ def slide_clear(
         if left_out >= reach:
             i += math.floor(left_out / reach)
             continue
-        if nearness(clearance, x, y)[1] < shape.inscribed - TOUCH:
+        if nearness(clearance, x, y)[1] < shape.inscribed - shape.touch:
             return False
         to_x, to_y, to_yaw = ax + t * dx, ay + t * dy, a + t * turn
         if not step_clear(ground, shape, x, y, yaw, to_x, to_y, to_yaw, grow):
@@ -194,9 +195,9 @@ def _may_stand(ground: Ground, shape: Shape, x: float, y: float) -> bool:
     """Whether the largest disc about base_link within the footprint may be clear at a place."""
     if not within(ground.clearance, x, y, 0.0):
         return False
-    if nearness(ground.clearance, x, y)[1] < shape.inscribed - TOUCH:
+    if nearness(ground.clearance, x, y)[1] < shape.inscribed - shape.touch:
         return False
-    has_inside = shape.inscribed > TOUCH or len(shape.corners) == 0
+    has_inside = shape.inscribed > shape.touch or len(shape.corners) == 0
     return not (has_inside and ground.blocked[int(y), int(x)])
 
 
@@ -254,6 +255,7 @@ def _shape(corners: Floats, begins: Ints, discs: Floats, numbers: Floats) -> Sha
         numbers[SPIKE],
         numbers[INSCRIBED],
         numbers[BULGE],
+        numbers[TOUCH],
     )
 
 

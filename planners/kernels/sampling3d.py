@@ -14,7 +14,6 @@ from numba import njit
 from groundmap.arrays import Bools, Ints, Ints32
 from planners.kernels.distance import NOWHERE, envelope, squared_distances
 
-SLACK = 5e-10  # [m] shortfall of clearance that is put down to the rounding of coordinates
 NEAR = 0.2  # [voxels] room below which a line is checked exactly instead of stepped along
 PIECE = 1.0  # [voxels] longest piece of a line that is checked exactly
 HALVINGS = 64  # of a line, before its pieces are short: no float is that long
@@ -75,6 +74,7 @@ def line_clear(
     squared: Ints32,
     size: float,
     radius: float,
+    slack: float,
     ax: float,
     ay: float,
     az: float,
@@ -95,6 +95,8 @@ def line_clear(
     size : float [m]
         Of a voxel.
     radius : float [m]
+    slack : float [m]
+        Shortfall of the radius that is put down to rounding.
     ax, ay, az, bx, by, bz : float [m]
         From the map's outer corner.
     """
@@ -102,9 +104,8 @@ def line_clear(
     dx, dy, dz = bx / size - x, by / size - y, bz / size - z
     if not (_within(squared, x, y, z) and _within(squared, bx / size, by / size, bz / size)):
         return False
-    slack = SLACK / size
-    need = max(radius / size, 2.0 * slack)
-    least = need - slack
+    need = max(radius / size, 2.0 * slack / size)
+    least = need - slack / size
     for s in (1.0, 0.0):
         if _nearness(squared, x + s * dx, y + s * dy, z + s * dz)[1] < least:
             return False

@@ -10,7 +10,7 @@ from numba import njit
 
 from groundmap.arrays import Bools, Floats, Ints
 from planners.kernels.addresses import bools_at, floats_at, ints_at
-from planners.kernels.sampling import ARM, RADIUS, SIZE, Body, curve_clear, slide_clear
+from planners.kernels.sampling import ARM, RADIUS, SIZE, TOUCH, Body, curve_clear, slide_clear
 from planners.kernels.sampling_lines import line_clear
 
 # Where the table has the fields of `Body`.
@@ -23,7 +23,7 @@ def line_clear_at(table: int, ax: float, ay: float, bx: float, by: float) -> boo
     numbers = floats_at(table, NUMBERS)
     size, radius = numbers[SIZE, 0], numbers[RADIUS, 0] + numbers[ARM, 0]  # one of these is 0
     blocked, clearance = bools_at(table, BLOCKED), floats_at(table, CLEARANCE)
-    return line_clear(blocked, clearance, size, radius, ax, ay, bx, by)
+    return line_clear(blocked, clearance, size, radius, numbers[TOUCH, 0], ax, ay, bx, by)
 
 
 @njit(cache=True)

@@ -22,6 +22,7 @@ from planners.kernels.sampling import (
     RADIUS,
     SIZE,
     SPIKE,
+    TOUCH,
     comes_later,
     curve_motions,
 )
@@ -42,7 +43,7 @@ def line_cost(
     ----------
     costs : ndarray of uint8, shape (rows, cols)
         Of cells, 252 at most.
-    numbers : ndarray, shape (7,)
+    numbers : ndarray, shape (8,)
         As in `Body`.
     prices : ndarray, shape (4,)
     ax, ay, bx, by : float [m]
@@ -181,4 +182,5 @@ def _shape(numbers: Floats) -> Shape:
         numbers[SPIKE],
         numbers[INSCRIBED],
         numbers[BULGE],
+        numbers[TOUCH],
     )

@@ -8,7 +8,7 @@ from numba import njit
 
 from groundmap.arrays import Bools, Floats
 from planners.kernels.clearance import square_distance
-from planners.kernels.footprint import TOUCH, within
+from planners.kernels.footprint import within
 
 NEAR = 0.2  # [cells] room below which a line is checked exactly instead of stepped along
 
@@ -19,6 +19,7 @@ def line_clear(
     clearance: Floats,
     size: float,
     radius: float,
+    touch: float,
     ax: float,
     ay: float,
     bx: float,
@@ -36,6 +37,8 @@ def line_clear(
     size : float [m]
         Of a cell.
     radius : float [cells]
+    touch : float [cells]
+        Overlap that is put down to rounding.
     ax, ay, bx, by : float [m]
     """
     ax, ay, bx, by = ax / size, ay / size, bx / size, by / size
@@ -43,7 +46,7 @@ def line_clear(
         return False
     if blocked[int(by), int(bx)]:  # a planner knows the state that it comes from to be clear
         return False
-    need = max(radius, 2.0 * TOUCH)
+    need = max(radius, 2.0 * touch)
     dx, dy = bx - ax, by - ay
     length = math.sqrt(dx * dx + dy * dy)
     if length > 0.0:
@@ -59,10 +62,10 @@ def line_clear(
         if room - off >= NEAR:
             at += room - off
         else:
-            if blocked[row, col] or room + off < -TOUCH:
+            if blocked[row, col] or room + off < -touch:
                 return False
             to = min(at + 1.0, length)
-            if not _piece_clear(blocked, x, y, ax + to * dx, ay + to * dy, need):
+            if not _piece_clear(blocked, x, y, ax + to * dx, ay + to * dy, need, touch):
                 return False
             at += 1.0
         if at >= length:
@@ -70,13 +73,15 @@ def line_clear(
 
 
 @njit(cache=True, nogil=True)
-def _piece_clear(blocked: Bools, ax: float, ay: float, bx: float, by: float, need: float) -> bool:
+def _piece_clear(
+    blocked: Bools, ax: float, ay: float, bx: float, by: float, need: float, touch: float
+) -> bool:
     """Whether a short segment is as far as `need` from all blocked squares."""
     rows, cols = blocked.shape
     left, right = math.floor(min(ax, bx) - need), math.floor(max(ax, bx) + need)
     low, high = math.floor(min(ay, by) - need), math.floor(max(ay, by) + need)
     for row in range(max(low, 0), min(high, rows - 1) + 1):
         for col in range(max(left, 0), min(right, cols - 1) + 1):
-            if blocked[row, col] and square_distance(ax, ay, bx, by, col, row) < need - TOUCH:
+            if blocked[row, col] and square_distance(ax, ay, bx, by, col, row) < need - touch:
                 return False
     return True

@@ -228,7 +228,7 @@ def _distance(*places: float) -> float:
 
 def _numbers(costmap: Costmap, settings: SamplingSettings) -> Floats:
     size = costmap.window.resolution
-    shape = shape_of(costmap.problem.shape, size)
+    shape = shape_of(costmap.problem.shape, size, slack=costmap.slack)
     return np.array([size, settings.turning_radius / size, *shape[3:]])
 
 

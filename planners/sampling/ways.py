@@ -85,7 +85,8 @@ class Ways:
     def __init__(self, costmap: Costmap, space: Space, turning_radius: float) -> None:
         self.costmap, self.space, self.turning_radius = costmap, space, turning_radius
         size = costmap.window.resolution
-        ground, self.shape = ground_of(costmap), shape_of(costmap.problem.shape, size)
+        ground = ground_of(costmap)
+        self.shape = shape_of(costmap.problem.shape, size, slack=costmap.slack)
         self.body = Body(
             *ground,
             *self.shape[:3],

@@ -13,7 +13,7 @@ from scipy import ndimage
 from groundmap.arrays import Bools, Floats, Ints32
 from planners.engine import Pose
 from planners.kernels.distance import NOWHERE
-from planners.kernels.sampling3d import SLACK, all_squared_distances, line_clear
+from planners.kernels.sampling3d import all_squared_distances, line_clear
 from planners.sampling.settings import Space
 from planners.sampling.ways import REACH, SHARE, Bounds, box_of
 from planners.voxels import Voxels
@@ -61,7 +61,8 @@ class Ways3D:
     def __init__(self, voxels: Voxels) -> None:
         self.voxels = self.costmap = voxels
         self.squared = all_squared_distances(voxels.blocked)
-        self.is_clear = partial(line_clear, self.squared, voxels.window.resolution, voxels.radius)
+        numbers = voxels.window.resolution, voxels.radius, voxels.slack
+        self.is_clear = partial(line_clear, self.squared, *numbers)
 
     def state_of(self, pose: Pose) -> Pose:
         """Return a pose [map] as a state; a yaw is left out."""
@@ -119,7 +120,8 @@ class Ways3D:
     def _parts(self) -> Ints32:
         """Parts of the map that no way joins, numbered from 1; 0 where the ball is never clear."""
         # In half voxels; a corner is √3 of them from the centre, and may be that much clearer.
-        need = 2.0 * (self.voxels.radius - SLACK) / self.voxels.window.resolution - math.sqrt(3.0)
+        least_clearance = self.voxels.radius - self.voxels.slack
+        need = 2.0 * least_clearance / self.voxels.window.resolution - math.sqrt(3.0)
         places = self.squared > 0
         if need > 0.0:
             least = math.ceil(need * need * (1.0 - ROUNDING))
