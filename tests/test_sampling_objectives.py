@@ -258,7 +258,7 @@ def test_where_only_length_counts_the_cost_is_what_ompl_says(
     theirs = space_of(base, space, (0.0, 0.0, 20.0, 20.0), told)
     information = base.SpaceInformation(theirs)
     information.setup()
-    native = objective.as_ompl(base, information)
+    native = objective.as_ompl(base, information, lambda: None)
     assert type(native) is base.PathLengthOptimizationObjective
     a, b = states_of(rng, ways, 2)
     x, y = state_of(theirs, a, space), state_of(theirs, b, space)
@@ -278,7 +278,7 @@ def test_ompl_asks_for_our_costs(space: Space) -> None:
     theirs = space_of(base, space, (0.0, 0.0, 20.0, 20.0), SamplingSettings())
     information = base.SpaceInformation(theirs)
     information.setup()
-    asked = objective.as_ompl(base, information)
+    asked = objective.as_ompl(base, information, lambda: None)
     states = states_of(rng, ways, 4)
     path = geometric.PathGeometric(information)
     for state in states:
