@@ -41,6 +41,7 @@ HEEDING = frozenset({"bfmt", "bitstar", "fmt", "informedrrtstar", "rrtstar", "so
 # There, FMT asks for hundreds of thousands of costs between two looks at the clock, and its twin
 # can't plan at all.
 HEEDLESS_FORWARD = frozenset({"bfmt", "fmt"})
+SURE = 1.0 - 1e-10  # share of a lower bound that rounding leaves below the cost
 
 
 class Objective:
@@ -205,9 +206,11 @@ def _edge(costmap: Costmap, space: Space, settings: SamplingSettings) -> Callabl
 def _least(costmap: Costmap, space: Space, settings: SamplingSettings) -> Callable[..., float]:
     """Return what gives the cost of the shortest path between two states over the cheapest cells.
 
-    Of curves, that is the shortest one, and not the straight line: it tells far more.
+    Of curves, that is the shortest one, and not the straight line: it tells far more. It is less
+    than any real cost by more than rounding: BIT* prunes what can't improve its route, and where
+    rounding made this bound the larger one, it pruned vertices of the route itself and crashed.
     """
-    metre, second = _metre(costmap, settings), settings.time_weight
+    metre, second = SURE * _metre(costmap, settings), SURE * settings.time_weight
     drive, turn = second / settings.max_speed, second / settings.max_turn_rate
     if space == "r2":
         return lambda ax, ay, bx, by: (metre + drive) * math.hypot(bx - ax, by - ay)

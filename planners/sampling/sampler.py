@@ -241,7 +241,11 @@ class Sampler:
             return CancelledError(self.name, seconds=clock.seconds, expanded=found.checked)
         if clock.is_up and clock.time_limit is not None:
             return TimeLimitError(
-                self.name, time_limit=clock.time_limit, expanded=found.checked, left=found.left
+                self.name,
+                time_limit=clock.time_limit,
+                expanded=found.checked,
+                unit="edges checked",
+                left=found.left,
             )
         reason = REASONS.get(found.status, found.status)
         if settings.iterations is not None and found.status in ("TIMEOUT", "APPROXIMATE_SOLUTION"):
