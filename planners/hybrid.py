@@ -97,8 +97,9 @@ class HybridAStar:
 
     Between two poses the footprint is taken to sweep the convex hull of its places in both (of a
     concave one: of each triangle of its constrained Delaunay triangulation), and where it turns,
-    about a millimetre around that (`BULGE` in `planners.hybrid_parts`), which no point of it ever
-    leaves. A disc is checked by the distance of the line. Where nothing turns, both are exact.
+    about a millimetre around that (on cells of more than a metre, a thousandth of a cell: `BULGE`
+    in `planners.hybrid_parts`), which no point of it ever leaves. A disc is checked by the
+    distance of the line. Where nothing turns, both are exact.
 
     Examples
     --------
