@@ -20,7 +20,7 @@ FILE = Path(__file__).parents[1] / "docs" / "settings.md"
 HEAD = """# Settings of planners
 
 `planners.plan(problem, "NAME", setting=value)`, or `groundmap plan --planner NAME --set
-setting=value`. Every planner takes `time_limit`, the search time [s], 30 unless told, none for no
+setting=value`. Every planner takes `time_limit`, the time [s] from the call to the answer, 30 unless told, none for no
 limit; a number beyond its range is refused.
 """
 SAMPLING = """
