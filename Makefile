@@ -1,5 +1,7 @@
 PYTHON ?= python3
 WORKERS ?= auto
+ATTEMPTS ?= 2000
+SEED ?=
 
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
@@ -8,7 +10,7 @@ INSTALLED := .venv/.installed
 READY := .venv/.ready
 WHEEL_VENV := .wheel-venv
 
-.PHONY: help setup demo test check size wheel-test clean
+.PHONY: help setup demo test check crash-matrix size wheel-test clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "%-12s %s\n", $$1, $$2}' Makefile
@@ -36,6 +38,9 @@ check: $(READY) ## Check format, lint, types and import contracts
 	$(BIN)/ruff check
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
+
+crash-matrix: $(READY) ## Plan at random in processes that may crash (ATTEMPTS=2000 SEED=7)
+	$(BIN)/python tools/crash_matrix.py --attempts $(ATTEMPTS) $(if $(SEED),--seed $(SEED))
 
 size: $(READY) ## Print lines per module, longest functions, public names, layers
 	@$(BIN)/python tools/size.py

@@ -146,8 +146,10 @@ def _cells_near(window: GridWindow, line: shapely.Geometry, reach: float) -> Int
     a, b = points[:count], points[-count:]
     first = np.maximum(window.world_to_cell(np.minimum(a, b) - reach), 0)
     last = window.world_to_cell(np.maximum(a, b) + reach)
+    boxes = np.column_stack([first, last + 1])
+    fresh = np.append(True, (np.diff(boxes, axis=0) != 0).any(axis=1))  # poses may be dense
     near = np.zeros(window.count.shape, dtype=np.bool_)
-    for (row, col), (end_row, end_col) in zip(first.tolist(), (last + 1).tolist(), strict=True):
+    for row, col, end_row, end_col in boxes[fresh].tolist():
         near[row:end_row, col:end_col] = True
     return np.argwhere(near)
 

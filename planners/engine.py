@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
 
 from pydantic import Field
@@ -12,6 +14,7 @@ from groundmap.arrays import Floats
 from groundmap.settings import Settings
 from planners.costmap import Costmap
 from planners.errors import CancelledError, ProblemError, TimeLimitError
+from planners.kernels.compiling import compiled_for
 from planners.problem import PlanningProblem
 
 if TYPE_CHECKING:
@@ -25,7 +28,11 @@ Pose = tuple[float, ...]  #: x, y [m, map] and, where the planner heeds it, yaw 
 class SearchSettings(Settings):
     """What every planner can be told."""
 
-    time_limit: float | None = Field(30.0, ge=0, description="search time [s]; none: no limit")
+    time_limit: float | None = Field(
+        30.0,
+        ge=0,
+        description="time from the call to the answer, but for compilation [s]; none: no limit",
+    )
 
     def heeds_headings(self, problem: PlanningProblem) -> bool:
         """Whether a planner that knows headings heeds them, told this."""
@@ -122,28 +129,64 @@ def check_uniform(planner: str, costmap: Costmap) -> None:
         )
 
 
+_began: ContextVar[float | None] = ContextVar("_began", default=None)
+
+
+def now() -> float:
+    """Return a time [s], to compare with others: it stands still while kernels are compiled."""
+    return time.perf_counter() - compiled_for()
+
+
+@contextmanager
+def clock_from(began: float) -> Iterator[None]:
+    """Let the next `Clock` in this thread begin at a time before it is made.
+
+    Parameters
+    ----------
+    began : float [s]
+        By `now`.
+    """
+    token = _began.set(began)
+    try:
+        yield
+    finally:
+        _began.reset(token)
+
+
 class Clock:
     """The time that a search has left.
+
+    It stands still while kernels are compiled.
 
     Parameters
     ----------
     planner : str
         Name for the exception.
     time_limit : float or None [s]
+        From now, or from the time that `clock_from` was given.
     cancel : Cancel, optional
         Once it is set, time is up, too.
+
+    Examples
+    --------
+    >>> with clock_from(now() - 5.0):
+    ...     first, second = Clock("astar", 1.0), Clock("astar", 1.0)
+    >>> first.is_up, second.is_up
+    (True, False)
     """
 
     def __init__(
         self, planner: str, time_limit: float | None, cancel: Cancel | None = None
     ) -> None:
         self.planner, self.time_limit, self.cancel = planner, time_limit, cancel
-        self.began = time.perf_counter()
+        began = _began.get()
+        _began.set(None)  # a search that this one's callbacks make has a limit of its own
+        self.began = now() if began is None else began
 
     @property
     def seconds(self) -> float:
         """Seconds since the search began."""
-        return time.perf_counter() - self.began
+        return now() - self.began
 
     @property
     def is_up(self) -> bool:

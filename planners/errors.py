@@ -250,7 +250,9 @@ class TimeLimitError(NoRouteError):
     planner : str
     time_limit : float [s]
     expanded : int
-        Nodes that were expanded; of sampling planners, edges that were checked.
+        How much was searched, in `unit`.
+    unit : str, default "nodes expanded"
+        Sampling planners count "edges checked".
     left : float, optional [m]
         What was left to the goal from the nearest place that a sampling planner reached.
 
@@ -261,13 +263,19 @@ class TimeLimitError(NoRouteError):
     """
 
     def __init__(
-        self, planner: str, *, time_limit: float, expanded: int, left: float | None = None
+        self,
+        planner: str,
+        *,
+        time_limit: float,
+        expanded: int,
+        unit: str = "nodes expanded",
+        left: float | None = None,
     ) -> None:
         self.planner, self.time_limit, self.expanded = planner, time_limit, expanded
-        self.left = left
+        self.unit, self.left = unit, left
         super().__init__(
             f"{planner}: no route within time_limit = {time_limit:g} s "
-            f"({expanded} nodes expanded{left_clause(left)}). Allow more time."
+            f"({expanded} {unit}{left_clause(left)}). Allow more time."
         )
 
 

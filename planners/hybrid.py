@@ -38,10 +38,11 @@ from planners.kernels.hybrid import (
     refile,
 )
 from planners.kernels.hybrid_field import seed_field
-from planners.kernels.hybrid_motion import ROOT, Drive, Prices, pieces, steering
+from planners.kernels.hybrid_motion import ROOT, Drive, Prices, pieces, reach, steering
 from planners.wording import Place
 
-SLICE = 1000  # expansions between two looks at the clock: about 20 ms
+SLICE = 1000  # expansions between two looks at the clock, at most
+SOON = 0.02  # [s] between two looks, about: an expansion takes microseconds, or milliseconds
 FIRST_ROOM = 1 << 12  # nodes to begin with
 
 
@@ -96,8 +97,9 @@ class HybridAStar:
 
     Between two poses the footprint is taken to sweep the convex hull of its places in both (of a
     concave one: of each triangle of its constrained Delaunay triangulation), and where it turns,
-    about a millimetre around that (`BULGE` in `planners.hybrid_parts`), which no point of it ever
-    leaves. A disc is checked by the distance of the line. Where nothing turns, both are exact.
+    about a millimetre around that (on cells of more than a metre, a thousandth of a cell: `BULGE`
+    in `planners.hybrid_parts`), which no point of it ever leaves. A disc is checked by the
+    distance of the line. Where nothing turns, both are exact.
 
     Examples
     --------
@@ -150,10 +152,13 @@ class HybridAStar:
         seed_field(self.field, int(b[1]) * self.costmap.width + int(b[0]))
         state = begin(self.ground, self.field, drive, a, b, self.nodes, self.heap)
         shot = no_shot()
-        status = -1
+        status, budget = -1, 1
         while status not in (FOUND, EXHAUSTED):
             clock.check(int(state[EXPANDED]))
-            status = self._advance(drive, b, state, shot)
+            before = clock.seconds
+            status = self._advance(drive, b, state, shot, budget)
+            hurried = clock.seconds - before > SOON
+            budget = max(budget // 4, 1) if hurried else min(2 * budget, SLICE)
         if status == EXHAUSTED:
             return None
         curvatures, lengths = self._motions(drive, int(state[LAST]), shot)
@@ -173,7 +178,9 @@ class HybridAStar:
         x, y, yaw = pose.tolist()
         return within and bool(step_clear(self.ground, self.shape, x, y, yaw, x, y, yaw, 0.0))
 
-    def _advance(self, drive: Drive, goal: Floats, state: Ints, shot: Shot) -> int:
+    def _advance(
+        self, drive: Drive, goal: Floats, state: Ints, shot: Shot, budget: int = SLICE
+    ) -> int:
         status: int = advance(
             self.ground,
             self.shape,
@@ -185,7 +192,7 @@ class HybridAStar:
             self.heap,
             state,
             shot,
-            SLICE,
+            budget,
         )
         if status == FULL:
             self.heap = np.concatenate([self.heap, np.empty_like(self.heap)])
@@ -201,7 +208,7 @@ class HybridAStar:
         motions = []
         while self.nodes.motions[node] != ROOT:
             gear, turn = steering(self.nodes.motions[node])
-            motions.append((turn * drive.curvature, gear * drive.step))
+            motions.append((turn * drive.curvature, gear * reach(drive, turn)))
             node = self.nodes.parents[node]
         motions.reverse()
         for turn, arc in zip(shot.turns.tolist(), shot.lengths.tolist(), strict=True):
@@ -240,6 +247,7 @@ def _drive(settings: HybridAStarSettings, size: float) -> Drive:
         step = max(settings.step_length / size, step)
     return Drive(
         step=step,
+        arc=min(step, math.pi * settings.turning_radius / size),
         curvature=size / settings.turning_radius,
         gears=1 if settings.motion == "dubins" else 2,
         reverse=settings.reverse_penalty,

@@ -18,7 +18,9 @@ from planners.lattice import allowed_moves
 from planners.rounding import SLACK
 
 MITRE_LIMIT = 5.0  # of shapely and others that grow outlines: sharper corners are cut off
-BULGE = 1e-3  # [m] how far the footprint may leave the hulls of the poses it is checked at
+# How far the footprint may leave the hulls of the poses it is checked at: [m], and on cells of more
+# than a metre, where a millimetre would take thousands of poses a turn, as a share of a cell.
+BULGE = 1e-3
 
 
 def ground_of(costmap: Costmap) -> Ground:
@@ -43,7 +45,7 @@ def shape_of(footprint: Footprint, size: float, *, slack: float = SLACK) -> Shap
         arm=0.0 if footprint.is_disc else radius,
         spike=max(map(_spike, parts), default=1.0),
         inscribed=footprint.inscribed_radius / size,
-        bulge=BULGE / size,
+        bulge=max(BULGE / size, BULGE),
         touch=slack / size,
     )
 

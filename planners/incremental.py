@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -14,6 +13,7 @@ from groundmap.arrays import Floats, Ints
 from planners.answers import check_on_map
 from planners.costmap import Costmap, whole_cells
 from planners.dstar_lite import DStarLite, DStarLiteSettings
+from planners.engine import now
 from planners.errors import ProblemError
 from planners.extent import padded_bounds
 from planners.problem import PlanningProblem
@@ -114,7 +114,7 @@ class IncrementalPlanner:
             The route keeps not what was asked: cells that changed were not said with `update`,
             or a bug in the planner.
         """
-        began = time.perf_counter()
+        began = now()
         self.problem = replace(
             self.problem,
             start=self.problem.start if start is None else start,

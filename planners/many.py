@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import threading
-import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -14,7 +13,7 @@ from typing import Any, NamedTuple, TypeAlias
 from groundmap.arrays import Floats
 from planners.answers import check_on_map
 from planners.costmap import Costmap
-from planners.engine import Engine, SearchSettings
+from planners.engine import Engine, SearchSettings, now
 from planners.errors import NoRouteError, ProblemError
 from planners.problem import PlanningProblem
 from planners.registry import Planner, named
@@ -173,7 +172,7 @@ def _answer(desk: _Desk, problem: PlanningProblem) -> Route | NoRouteError:
 
 
 def _route(desk: _Desk, engine: Engine, problem: PlanningProblem) -> Route:
-    began = time.perf_counter()
+    began = now()
     check_on_map(problem, goal=not desk.settings.takes_other_goals)
     return solve(
         posed(desk.costmap, problem),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator, MutableMapping
 from functools import cache, partial
 from typing import Any, NamedTuple
@@ -20,7 +19,7 @@ from planners.astar import (
 from planners.astar3d import AStar3D
 from planners.auto import Auto, AutoSettings
 from planners.dstar_lite import DStarLite, DStarLiteSettings
-from planners.engine import Cancel, Engine, OnImproved, SearchSettings, check_cancel
+from planners.engine import Cancel, Engine, OnImproved, SearchSettings, check_cancel, now
 from planners.errors import ProblemError
 from planners.hybrid import HybridAStar, HybridAStarSettings
 from planners.jps import JPS, JPSPlus, JPSPlusSettings, JPSSettings
@@ -170,8 +169,8 @@ def plan(
     >>> route.waypoints.tolist()[0], route.min_clearance, route.audit
     ([2.0, 2.0], 2.0, 'clean')
     """
-    began = time.perf_counter()
     entry = named(planner)
+    began = now()
     chosen = entry.settings(**settings)
     watch = _watch(planner, entry, on_improved=on_improved, cancel=cancel)
     check_on_map(problem, goal=not chosen.takes_other_goals)

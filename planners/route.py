@@ -306,7 +306,9 @@ def _covered(space: Space, found: Found, places: Floats) -> Bools:
     covered = np.zeros(len(places), dtype=np.bool_)
     outline = shapely.Polygon(polygon)
     shapely.prepare(outline)
-    for xy, yaw in zip(found.waypoints, found.headings.tolist(), strict=True):
+    low, high = places.min(axis=0) - space.radius, places.max(axis=0) + space.radius
+    near = ((found.waypoints >= low) & (found.waypoints <= high)).all(axis=1)
+    for xy, yaw in zip(found.waypoints[near], found.headings[near].tolist(), strict=True):
         x, y = (places - xy).T
         cos, sin = math.cos(yaw), math.sin(yaw)
         covered |= shapely.intersects_xy(outline, cos * x + sin * y, cos * y - sin * x)

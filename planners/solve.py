@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -12,7 +11,7 @@ from planners.astar3d import AStar3D
 from planners.costmap import Costmap
 from planners.enclosure import enclosed
 from planners.enclosure3d import enclosed_3d
-from planners.engine import Engine, Pose
+from planners.engine import Engine, Pose, clock_from, now
 from planners.errors import AuditError, ProblemError
 from planners.problem import PlanningProblem
 from planners.route import Route
@@ -42,7 +41,8 @@ def solve(
     settings : Settings
         The engine's.
     began : float [s]
-        When the work for this route began, by `time.perf_counter`.
+        When the work for this route began, by `planners.engine.now`: the time limit counts from
+        then.
     headings : bool, default False
         Whether the planner heeds headings, so that an outline is turned with the robot.
     audited : bool, default True
@@ -64,7 +64,8 @@ def solve(
             expected = f"x, y [m] and yaw [rad] for {engine.name}"
             raise ProblemError(place, expected, str(pose))
         check_space(space, place, pose, headings=headings)
-    found = engine.search(start, goal, settings, **(watch or {}))
+    with clock_from(began):
+        found = engine.search(start, goal, settings, **(watch or {}))
     if found is None:
         if isinstance(space, Voxels):
             raise enclosed_3d(space)
@@ -75,7 +76,7 @@ def solve(
             off = math.dist(found.goal[:axes], goal[:axes])
             raise AuditError("ends at no goal", found.goal[:axes], got=off, needed=0.0)
         space = posed(space, replace(problem, goal=found.goal, cleared_at=problem.clear_place))
-    seconds = time.perf_counter() - began
+    seconds = now() - began
     return answer(space, found, planner=engine.name, seconds=seconds, audited=audited)
 
 

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import sysconfig
+from itertools import count
 from pathlib import Path
+from typing import Any
 
 import hypothesis
 import pytest
 
 import groundmap
 import planners
+from planners.engine import Clock, SearchSettings
 
+DEFAULT_LIMIT = SearchSettings().time_limit
+TICK = 1e-3  # [s] that pass at each look at the clock of `ticking`
 PACKAGES = (groundmap, planners)
 
 # The same examples every time, and no clock: kernels compile during some first example.
@@ -22,6 +27,25 @@ hypothesis.settings.register_profile(
     suppress_health_check=[hypothesis.HealthCheck.too_slow],
 )
 hypothesis.settings.load_profile("ci")
+
+
+@pytest.fixture(autouse=True)
+def no_default_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let no search end by the default time limit: on a slow machine, it may need longer."""
+    begin = Clock.__init__
+
+    def unlimited(self: Clock, planner: str, time_limit: float | None, *rest: Any) -> None:
+        begin(self, planner, None if time_limit == DEFAULT_LIMIT else time_limit, *rest)
+
+    monkeypatch.setattr(Clock, "__init__", unlimited)
+
+
+@pytest.fixture
+def ticking(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let time pass only where a search looks at the clock."""
+    looks = count()
+    for module in ("engine", "solve", "registry"):
+        monkeypatch.setattr(f"planners.{module}.now", lambda: TICK * next(looks))
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

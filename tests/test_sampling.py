@@ -247,6 +247,7 @@ def test_a_way_that_ends_beside_the_goal_is_none() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(set(R2) - set(THREADED)))
+@pytest.mark.usefixtures("ticking")
 def test_time_that_ran_out_is_told_and_ends_no_process(name: str) -> None:
     z = free_field(48, 48)
     z[20:28] = BLOCKED

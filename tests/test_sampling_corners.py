@@ -33,7 +33,7 @@ from planners.costmap import Costmap
 from planners.engine import Found
 from planners.sampling import sliced
 from planners.sampling.roadmap import Roadmap
-from planners.sampling.settings import SamplingSettings
+from planners.sampling.settings import SamplingSettings, Space
 from planners.sampling.ways import Ways
 from planners.solve import solve
 
@@ -141,6 +141,20 @@ def test_a_copy_of_ways_reads_arrays_of_its_own(again: Any) -> None:
     assert twin.is_clear(3, 3, 0, 4, 4, 0)
 
 
+@pytest.mark.parametrize("again", [copy.deepcopy, pickle.dumps])
+@pytest.mark.parametrize("space", ["r2", "se2", "dubins", "reeds_shepp"])
+def test_a_check_of_edges_is_neither_copied_nor_pickled(space: Space, again: Any) -> None:
+    ways = Ways(Costmap.of(asked(footprint=CAR)), space, 1.0)
+    with pytest.raises(TypeError, match=r"is_clear can't be copied or pickled.* its Ways instead"):
+        again(ways.is_clear)
+
+
+def test_a_shallow_copy_of_a_check_keeps_its_arrays() -> None:
+    ways = Ways(Costmap.of(asked(footprint=CAR)), "se2", 1.0)
+    twin = copy.copy(ways.is_clear)
+    assert vars(twin)["kept"] is vars(ways.is_clear)["kept"]
+
+
 def test_a_roadmap_that_weighs_nothing_is_refused_before_it_grows() -> None:
     with pytest.raises(SettingsError, match="length_weight: expected more than 0"):
         Roadmap.grow(asked(), seconds=1e9, length_weight=0)
@@ -232,7 +246,7 @@ def test_a_roadmap_says_that_its_map_has_changed() -> None:
 
 def test_the_threads_of_many_plans_wait_without_loss() -> None:
     pairs = [((2, 2), (14, y)) for y in (2, 4, 6, 8)]
-    found = plan_many(asked(), pairs, "rrtstar", threads=4, improve_for=0.5, time_limit=0.9)
+    found = plan_many(asked(), pairs, "rrtstar", threads=4, improve_for=0.2, time_limit=None)
     assert all(isinstance(route, Route) for route in found)
 
 
@@ -240,5 +254,5 @@ def test_ctrl_c_ends_many_plans() -> None:
     timer = threading.Timer(0.5, _thread.interrupt_main)
     timer.start()
     with pytest.raises(KeyboardInterrupt, match=r"^$"):
-        plan_many(needle(), [((2, 2), (9.5, 10))] * 4, "rrtconnect", time_limit=60)
+        plan_many(needle(), [((2, 2), (9.5, 10))] * 4, "rrtconnect", time_limit=None)
     timer.join()

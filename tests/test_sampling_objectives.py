@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
 from itertools import pairwise
 from typing import Any
 
@@ -258,7 +260,7 @@ def test_where_only_length_counts_the_cost_is_what_ompl_says(
     theirs = space_of(base, space, (0.0, 0.0, 20.0, 20.0), told)
     information = base.SpaceInformation(theirs)
     information.setup()
-    native = objective.as_ompl(base, information)
+    native = objective.as_ompl(base, information, lambda: None)
     assert type(native) is base.PathLengthOptimizationObjective
     a, b = states_of(rng, ways, 2)
     x, y = state_of(theirs, a, space), state_of(theirs, b, space)
@@ -278,7 +280,7 @@ def test_ompl_asks_for_our_costs(space: Space) -> None:
     theirs = space_of(base, space, (0.0, 0.0, 20.0, 20.0), SamplingSettings())
     information = base.SpaceInformation(theirs)
     information.setup()
-    asked = objective.as_ompl(base, information)
+    asked = objective.as_ompl(base, information, lambda: None)
     states = states_of(rng, ways, 4)
     path = geometric.PathGeometric(information)
     for state in states:
@@ -419,3 +421,43 @@ def test_a_seed_repeats_a_route_over_dear_cells() -> None:
     first, again = (plan(problem, "rrtstar", iterations=300, seed=5) for _ in range(2))
     np.testing.assert_array_equal(again.waypoints, first.waypoints)
     assert again.cost == first.cost
+
+
+@pytest.mark.parametrize("space", PLANE)
+@given(rng=rngs())
+@settings(max_examples=15)
+def test_rounding_makes_no_lower_bound_exceed_a_cost(
+    space: Space, rng: np.random.Generator
+) -> None:
+    # In cells that all cost the least there is, the bound and the cost are the same number.
+    ways = ways_over(np.full((SIDE, SIDE), -0.5), space, CostSettings(confidence_weight=1.0))
+    objective = objective_of(ways)
+    for a, b in pairwise(states_of(rng, ways, 40)):
+        half: Pose = (*(0.5 * (p + q) for p, q in zip(a[:2], b[:2], strict=True)), *a[2:])
+        assert objective.least(*a, *b) < objective.edge(*a, *b)
+        assert objective.least(*a, *b) < objective.edge(*a, *half) + objective.edge(*half, *b)
+
+
+CRASHED = """
+import numpy as np
+from groundmap import ConfidenceGrid
+from planners import PlanningProblem, plan
+from planners.costs import CostSettings
+grid, rng = ConfidenceGrid(resolution=0.012), np.random.default_rng(7)
+field = np.full((24, 24), -1.0, dtype=np.float32)
+field[8:16, 4:16] = 1.0
+field[rng.random((24, 24)) < 0.05] = -0.3
+grid.fuse(np.array([0, 0]), field)
+costs = CostSettings(clearance_weight=10.0, inflation_radius=0.0, confidence_weight=10.0)
+ends = {"start": (0.1236, 0.0384), "goal": (0.1404, 0.2412)}
+problem = PlanningProblem(grid, **ends, footprint=0.0, costs=costs)
+print(plan(problem, "bitstar", time_limit=None, iterations=3000, seed=7).audit)
+"""
+
+
+@needs_ompl
+def test_bitstar_prunes_no_vertex_of_its_route() -> None:
+    ran = subprocess.run(
+        [sys.executable, "-c", CRASHED], capture_output=True, text=True, check=False
+    )
+    assert (ran.returncode, ran.stdout, ran.stderr) == (0, "clean\n", "")

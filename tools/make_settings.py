@@ -20,8 +20,8 @@ FILE = Path(__file__).parents[1] / "docs" / "settings.md"
 HEAD = """# Settings of planners
 
 `planners.plan(problem, "NAME", setting=value)`, or `groundmap plan --planner NAME --set
-setting=value`. Every planner takes `time_limit`, the search time [s], 30 unless told, none for no
-limit; a number beyond its range is refused.
+setting=value`. Every planner takes `time_limit`, the time [s] from the call to the answer, 30
+unless told, none for no limit; a number beyond its range is refused.
 """
 SAMPLING = """
 ## Sampling planners

@@ -30,6 +30,7 @@ from planners.kernels.hybrid_motion import (
     guess_of,
     pieces,
     price_of,
+    reach,
     steering,
 )
 
@@ -192,7 +193,7 @@ def _try(
     """Drive one motion from a node, and keep where it leads if that is worth it."""
     gear, turn = steering(motion)
     from_x, from_y, from_yaw = nodes.poses[node]
-    curvature, length = turn * drive.curvature, gear * drive.step
+    curvature, length = turn * drive.curvature, gear * reach(drive, turn)
     x, y, yaw = along(from_x, from_y, from_yaw, curvature, length)
     rows, cols = ground.blocked.shape
     if not (0.0 <= x < cols and 0.0 <= y < rows):

@@ -22,7 +22,8 @@ DETOUR = 7.3  # [radii] no curve, even forward only, needs more beyond the strai
 class Drive(NamedTuple):
     """How the robot moves, and what that costs."""
 
-    step: float  #: length of a motion
+    step: float  #: length of a straight motion
+    arc: float  #: length of a turning motion: half a circle at most, as more turns the other way
     curvature: float  #: at the steering's stop
     gears: int  #: 1: forward only; 2: both ways
     reverse: float  #: what a cell's side driven backwards costs
@@ -44,6 +45,12 @@ class Prices(NamedTuple):
 def steering(motion: int) -> tuple[int, int]:
     """Return the gear of a motion, 1 or -1, and its turn: 1 to the left, 0 or -1."""
     return 1 if motion < TURNS else -1, motion % TURNS - 1
+
+
+@njit(cache=True, nogil=True)
+def reach(drive: Drive, turn: int) -> float:
+    """Return the length of a motion with a turn."""
+    return drive.step if turn == 0 else drive.arc
 
 
 @njit(cache=True, nogil=True)

@@ -222,15 +222,8 @@ def curve_motions(
 ) -> tuple[Floats, Floats]:
     """Return the curve from a to b as motions: curvatures [1 / cells] and lengths [cells]."""
     radius = numbers[TURNING]
-    scale = numbers[SIZE] * radius
-    dx, dy = (bx - ax) / scale, (by - ay) / scale
-    cosine, sine = math.cos(a), math.sin(a)
-    x, y, turn = cosine * dx + sine * dy, cosine * dy - sine * dx, wrap(b - a)
     arcs, turns = np.zeros(SEGMENTS), np.zeros(SEGMENTS, dtype=np.int64)
-    if forward:
-        dubins_word(x, y, turn, arcs, turns)
-    else:
-        reeds_shepp_word(x, y, turn, 1.0, 0.0, arcs, turns)
+    curve_word(forward, numbers, ax, ay, a, bx, by, b, arcs, turns)
     counts = np.zeros(SEGMENTS, dtype=np.int64)
     for k in range(SEGMENTS):
         counts[k] = math.ceil(abs(arcs[k]) * radius / PIECE)
@@ -242,6 +235,37 @@ def curve_motions(
             lengths[at] = arcs[k] * radius / counts[k]
             at += 1
     return curvatures, lengths
+
+
+@njit(cache=True, nogil=True)
+def curve_word(
+    forward: bool,
+    numbers: Floats,
+    ax: float,
+    ay: float,
+    a: float,
+    bx: float,
+    by: float,
+    b: float,
+    arcs: Floats,
+    turns: Ints,
+) -> float:
+    """Find the curve from a to b; return its length [turning radii].
+
+    Parameters
+    ----------
+    forward, numbers, ax, ay, a, bx, by, b
+        As for `curve_motions`.
+    arcs, turns : ndarray, shape (5,)
+        Receive the segments, those not needed with length 0.
+    """
+    scale = numbers[SIZE] * numbers[TURNING]
+    dx, dy = (bx - ax) / scale, (by - ay) / scale
+    cosine, sine = math.cos(a), math.sin(a)
+    x, y, turn = cosine * dx + sine * dy, cosine * dy - sine * dx, wrap(b - a)
+    if forward:
+        return dubins_word(x, y, turn, arcs, turns)
+    return reeds_shepp_word(x, y, turn, 1.0, 0.0, arcs, turns)
 
 
 @njit(cache=True, nogil=True)

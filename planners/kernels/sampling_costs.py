@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from groundmap.arrays import Bytes, Floats
-from planners.kernels.curves import along, wrap
+from planners.kernels.curves import SEGMENTS, along, wrap
 from planners.kernels.footprint import Shape, cuts
 from planners.kernels.sampling import (
     ARM,
@@ -23,8 +23,10 @@ from planners.kernels.sampling import (
     SIZE,
     SPIKE,
     TOUCH,
+    TURNING,
     comes_later,
     curve_motions,
+    curve_word,
 )
 from planners.kernels.shortcut import leg_cost
 
@@ -166,8 +168,9 @@ def curve_length(
     """Return the length of the shortest curve from a to b, along its arcs [m]."""
     if not forward and comes_later(ax, ay, a, bx, by, b):
         ax, ay, a, bx, by, b = bx, by, b, ax, ay, a
-    _, lengths = curve_motions(forward, numbers, ax, ay, a, bx, by, b)
-    return float(numbers[SIZE] * np.abs(lengths).sum())
+    arcs, turns = np.zeros(SEGMENTS), np.zeros(SEGMENTS, dtype=np.int64)
+    length = curve_word(forward, numbers, ax, ay, a, bx, by, b, arcs, turns)
+    return float(numbers[SIZE] * numbers[TURNING] * length)
 
 
 @njit(cache=True, nogil=True)

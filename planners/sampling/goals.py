@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import chain
 
 import numpy as np
@@ -28,6 +28,7 @@ def goal_states(
     seed: int,
     *,
     within: Bools | None = None,
+    look: Callable[[], None] = lambda: None,
 ) -> list[Pose]:
     """Return the clear states in which a route may end; none if there is none.
 
@@ -46,6 +47,8 @@ def goal_states(
     seed : int
     within : ndarray of bool, shape (rows, cols), optional
         Cells that a route can end in; on voxels of shape (layers, rows, cols).
+    look : callable, optional
+        Called before each goal is sampled; it may raise.
 
     Returns
     -------
@@ -86,13 +89,11 @@ def goal_states(
     if settings.goal_radius == 0.0 and not (turns and settings.goal_yaw_tolerance > 0.0):
         return exact
     count = max(SAMPLES // len(goals), LEAST)
-    samples = [
-        sample
-        for number, place in enumerate(goals)
-        for sample in _samples(
-            ways, settings, place, np.random.default_rng([seed, number]), count, within=within
-        )
-    ]
+    samples: list[tuple[float, Pose]] = []
+    for number, place in enumerate(goals):
+        look()
+        rng = np.random.default_rng([seed, number])
+        samples += _samples(ways, settings, place, rng, count, within=within)
     return [*exact, *(state for _, state in sorted(samples))]
 
 

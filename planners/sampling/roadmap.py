@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
@@ -14,7 +13,7 @@ from groundmap.arrays import Floats, is_number
 from groundmap.errors import SettingsError
 from planners.answers import check_on_map, check_space
 from planners.costmap import Costmap
-from planners.engine import Cancel, Found, Pose, check_cancel
+from planners.engine import Cancel, Found, Pose, check_cancel, now
 from planners.errors import AuditError, ProblemError, UnsolvedError
 from planners.problem import PlanningProblem
 from planners.route import Route
@@ -168,7 +167,7 @@ class Roadmap:
         UnsolvedError
             The roadmap knows none; one that grew for longer may.
         """
-        began = time.perf_counter()
+        began = now()
         place = self.problem.clear_place
         problem = replace(self.problem, start=start, goal=goal, cleared_at=place)
         check_on_map(problem)

@@ -54,7 +54,7 @@ BY_EDGES = ("informedrrtstar", "kpiece1", "rrt", "rrtconnect", "rrtstar", "sorrt
 GLANCE = 16  # questions whether to stop between two looks at the clock
 # [s] after time is up, a planner that has not asked is stopped in an edge's check, without a route
 # and with one, which is lost then.
-LATE, LATE_WITH_ROUTE = 0.1, 0.5
+LATE, LATE_WITH_ROUTE = 0.1, 0.25
 ROUNDING = 1e-9  # relative, of costs
 # [m] RRT-Connect cuts an edge to its goal short by driving on from the goal: forward only, that
 # leads to nowhere.
@@ -167,7 +167,7 @@ class Run:
         definition.addStartState(state_of(space, self.task.start, kind))
         goals = [state_of(space, goal, kind) for goal in self.task.goals]
         definition.setGoal(goal_of(base, information, goals))
-        objective = self.task.objective.as_ompl(base, information)
+        objective = self.task.objective.as_ompl(base, information, self._look)
         definition.setOptimizationObjective(objective)
         return definition
 

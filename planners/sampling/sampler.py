@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 
 from groundmap.errors import SettingsError
 from planners.answers import check_on_map, check_space
@@ -92,12 +93,11 @@ class Sampler:
         TimeLimitError, CancelledError
             Time ran out, or somebody set `cancel`; with a limit of 0, always.
         """
+        clock = Clock(self.name, settings.time_limit, Ending(cancel))
         ways = self._ways_for(start, goal, settings)
         self._check(ways.space, settings)
         objective = Objective(ways, settings)
         objective.check(self.name)
-        _compile(ways, objective)
-        clock = Clock(self.name, settings.time_limit, Ending(cancel))
         clock.check(0)
         progress = Progress(clock, on_improved)
         task = self._task(ways, (start, goal), settings, progress, objective=objective)
@@ -157,7 +157,14 @@ class Sampler:
         if not settings.takes_other_goals:
             self._state(ways, "goal", goal)
         region = ways.region(begin)
-        goals = goal_states(ways, settings, goal, settings.seed, within=region)
+        goals = goal_states(
+            ways,
+            settings,
+            goal,
+            settings.seed,
+            within=region,
+            look=partial(progress.clock.check, 0),
+        )
         axes = len(begin) if ways.space in FLAT else 2
         place = start[:axes] if ways.space in FLAT else start
         if settings.takes_other_goals and settings.will_do(place, goal, axes=axes):
@@ -205,7 +212,7 @@ class Sampler:
             return self._told(task, first, 0)
         size = self.costmap.window.resolution
         longest = task.objective.longest(cost)
-        region = better_region(task.region, size, task.start, task.goals, longest)
+        region = better_region(task.region, size, task.start, task.goals, longest, clock=task.clock)
         room = box_of(region, size)
         with ExitStack() as mine:
             try:
@@ -234,19 +241,16 @@ class Sampler:
             return CancelledError(self.name, seconds=clock.seconds, expanded=found.checked)
         if clock.is_up and clock.time_limit is not None:
             return TimeLimitError(
-                self.name, time_limit=clock.time_limit, expanded=found.checked, left=found.left
+                self.name,
+                time_limit=clock.time_limit,
+                expanded=found.checked,
+                unit="edges checked",
+                left=found.left,
             )
         reason = REASONS.get(found.status, found.status)
         if settings.iterations is not None and found.status in ("TIMEOUT", "APPROXIMATE_SOLUTION"):
             reason = f"the goal was not reached in iterations = {settings.iterations}"
         return UnsolvedError(self.name, reason=reason, expanded=found.checked, left=found.left)
-
-
-def _compile(ways: Ways | Ways3D, objective: Objective) -> None:
-    """Compile what has to be, before time is counted."""
-    nowhere = (0.0,) * (2 if ways.space == "r2" else 3)
-    ways.is_clear(*nowhere, *nowhere)
-    objective.cost([nowhere, nowhere])
 
 
 def _alone_run(task: Task) -> Outcome:

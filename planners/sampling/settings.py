@@ -204,7 +204,8 @@ ONE_WAY = "It also follows edges backwards, which can't be driven: take 'rrt' or
 ENDLESS = "It may look for a better sample for ever: take 'informedrrtstar'."
 # Switches that a planner inherits and dies of.
 FIXED = {("sorrtstar", name) for name in ("focus_search", "informed_sampling", "sample_rejection")}
-# What ends the process, or brings paths that can't be driven: tools/try_samplers.py tries them all.
+# What ends the process, or brings paths that can't be driven: tried by
+# `tools/crash_matrix.py --refused`.
 REFUSED: dict[tuple[str, Space | None], str] = {
     ("aorrtc", None): "OMPL's AORRTC crashes: take 'bitstar'.",
     ("bfmt", "dubins"): ONE_WAY,

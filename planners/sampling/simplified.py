@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from itertools import pairwise
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import count, pairwise
+from typing import TypeVar
 
 import numpy as np
 
 from groundmap.arrays import Floats
 from planners.engine import Clock, Pose
+from planners.errors import CancelledError, TimeLimitError
 from planners.kernels.curves import wrap
 from planners.sampling.objectives import Objective
 from planners.sampling.settings import TURNING
+from planners.sampling.states import Glance
 from planners.sampling.ways import Ways
 from planners.sampling.ways3d import Ways3D
+
+T = TypeVar("T")
 
 PLACES = 48  # along a path, beside its states
 WINDOW = 150  # of them that are tried as the one before
@@ -46,6 +52,8 @@ def simplified(
     """
     best, cost = list(states), objective.cost(states)
     for turn in range(ROUNDS):
+        if clock.is_up:
+            break
         places = _with_places(ways, best, (turn + 1) * SHIFT % 1.0)
         trial = _cheapest(places, ways, objective, clock)
         if trial is None:
@@ -62,18 +70,25 @@ def _cheapest(
     places: list[Pose], ways: Ways | Ways3D, objective: Objective, clock: Clock
 ) -> list[Pose] | None:
     """Return the cheapest path from the first place to the last, onwards; None if time is up."""
-    edge, is_clear = objective.edge, ways.is_clear
+    calls, glance = count(1), Glance(partial(clock.check, 0))
+
+    def asked(question: Callable[..., T], i: int, j: int) -> T:
+        if (call := next(calls)) >= glance.due:
+            glance(call)
+        return question(*places[i], *places[j])
+
     costs, came = [0.0], [0]
-    for j in range(1, len(places)):
-        if clock.is_up:
-            return None
-        at, begin = places[j], max(0, j - WINDOW)
-        befores = [(costs[i] + edge(*places[i], *at), i) for i in range(begin, j)]
-        befores.sort()
-        clear = (before for before in befores if is_clear(*places[before[1]], *at))
-        cost, i = next(clear, (math.inf, j - 1))
-        costs.append(cost)
-        came.append(i)
+    try:
+        for j in range(1, len(places)):
+            begin = max(0, j - WINDOW)
+            befores = [(costs[i] + asked(objective.edge, i, j), i) for i in range(begin, j)]
+            befores.sort()
+            clear = (before for before in befores if asked(ways.is_clear, before[1], j))
+            cost, i = next(clear, (math.inf, j - 1))
+            costs.append(cost)
+            came.append(i)
+    except (TimeLimitError, CancelledError):
+        return None
     last, path = len(places) - 1, [places[-1]]
     while last > 0:
         last = came[last]
@@ -88,13 +103,15 @@ def _with_places(ways: Ways | Ways3D, states: list[Pose], shift: float) -> list[
     share = PLACES / sum(steps) if any(steps) else 0.0
     places = []
     for a, b, step in zip(states, states[1:], steps, strict=False):
-        count = round(step * share)
-        places += [a, *_between(ways, a, b, (np.arange(count) + shift) / max(count, 1))]
+        inner = round(step * share)
+        places += [a, *_between(ways, a, b, (np.arange(inner) + shift) / max(inner, 1))]
     return [*places, states[-1]]
 
 
 def _between(ways: Ways | Ways3D, a: Pose, b: Pose, shares: Floats) -> list[Pose]:
     """Return places along an edge, at shares of its length."""
+    if len(shares) == 0:
+        return []
     if ways.space in TURNING:
         poses = ways.poses([a, b])
         poses[:, :2] -= ways.costmap.window.origin

@@ -5,6 +5,7 @@ What is called back returns Python's own bool, and keeps no state: OMPL frees th
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from itertools import count
 from typing import Any
@@ -15,7 +16,46 @@ from planners.sampling.settings import FLAT, SamplingSettings, Space
 from planners.sampling.ways import Bounds, Ways
 from planners.sampling.ways3d import Ways3D
 
-OFTEN = 256  # checks between two looks
+OFTEN = 256  # calls between two looks, at most
+SOON = 0.002  # [s] between two looks, about: a call takes microseconds, or milliseconds
+
+
+class Glance:
+    """Decides when to look around between calls from OMPL, however long each of them takes.
+
+    Parameters
+    ----------
+    look : callable
+
+    Attributes
+    ----------
+    due : int
+        Number of the call, counted from 1, at which to look next.
+
+    Examples
+    --------
+    >>> looks = []
+    >>> glance = Glance(lambda: looks.append(None))
+    >>> for call in range(1, 1001):
+    ...     if call >= glance.due:
+    ...         glance(call)
+    >>> 4 <= len(looks) <= 1000
+    True
+    """
+
+    __slots__ = ("due", "last", "look", "step")
+
+    def __init__(self, look: Callable[[], None]) -> None:
+        self.look, self.due, self.step = look, 1, 1
+        self.last = time.perf_counter()
+
+    def __call__(self, call: int) -> None:
+        """Work out when to look next, and look."""
+        before, self.last = self.last, time.perf_counter()
+        hurried = self.last - before > SOON
+        self.step = max(self.step // 4, 1) if hurried else min(2 * self.step, OFTEN)
+        self.due = call + self.step
+        self.look()
 
 
 def space_of(base: Any, space: Space, room: Bounds, settings: SamplingSettings) -> Any:
@@ -80,10 +120,11 @@ def goal_of(base: Any, information: Any, goals: list[Any]) -> Any:
 def state_check(ways: Ways | Ways3D, look: Callable[[], None]) -> Callable[[Any], bool]:
     """Return what tells whether a state is clear, and looks around now and then."""
     is_clear, read, states = ways.is_clear, reader(ways.space), count(1)
+    glance = Glance(look)
 
     def check(state: Any) -> bool:
-        if not next(states) % OFTEN:
-            look()
+        if (call := next(states)) >= glance.due:
+            glance(call)
         return is_clear(*2 * read(state))
 
     return check
@@ -96,21 +137,21 @@ def edge_check(
 
     OMPL's third argument stays as it is.
     """
-    is_clear = ways.is_clear
+    is_clear, glance = ways.is_clear, Glance(look)
 
     def line(_: Any, a: Any, b: Any, __: Any = None) -> bool:
-        if not next(edges) % OFTEN:
-            look()
+        if (call := next(edges)) >= glance.due:
+            glance(call)
         return is_clear(a[0], a[1], b[0], b[1])
 
     def line_3d(_: Any, a: Any, b: Any, __: Any = None) -> bool:
-        if not next(edges) % OFTEN:
-            look()
+        if (call := next(edges)) >= glance.due:
+            glance(call)
         return is_clear(a[0], a[1], a[2], b[0], b[1], b[2])
 
     def poses(_: Any, a: Any, b: Any, __: Any = None) -> bool:
-        if not next(edges) % OFTEN:
-            look()
+        if (call := next(edges)) >= glance.due:
+            glance(call)
         return is_clear(a.getX(), a.getY(), a.getYaw(), b.getX(), b.getY(), b.getYaw())
 
     return {"r2": line, "r3": line_3d}.get(ways.space, poses)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import atexit
 import os
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from planners.engine import Cancel, Clock
+from planners.engine import Cancel, Clock, now
 
 PATIENCE = 0.1  # [s] between two looks at the clock, while another search runs
 FAREWELL = 5.0  # [s] that the interpreter's end waits for a search
@@ -63,12 +62,12 @@ def turn(clock: Clock) -> Iterator[None]:
     TimeLimitError, CancelledError
         Time was up before, or somebody wants no search any more.
     """
-    alone, began = _alone, time.perf_counter()
+    alone, began = _alone, now()
     while not alone.acquire(timeout=PATIENCE):
         if clock.is_cancelled:
             clock.check(0)
     try:
-        clock.began += time.perf_counter() - began
+        clock.began += now() - began
         clock.check(0)
         yield
     finally:

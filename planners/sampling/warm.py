@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from functools import reduce
 
 import numpy as np
 
 from groundmap.arrays import Bools, Floats
 from planners.astar import AStar, AStarSettings
 from planners.astar3d import AStar3D
-from planners.engine import Clock, Found, Pose, SearchSettings
+from planners.engine import Clock, Found, Pose, SearchSettings, clock_from
 from planners.errors import TimeLimitError
 from planners.hybrid import HybridAStar, HybridAStarSettings
 from planners.kernels.curves import wrap
@@ -39,9 +38,9 @@ def first_states(
     """
     if ways.space not in FLAT and len(goal) == 2:  # any heading will do
         goal = (*goal, start[2])
-    left = None if clock.time_limit is None else max(clock.time_limit - clock.seconds, 0.0)
     try:
-        found = _searched(ways, start, goal, settings, left)
+        with clock_from(clock.began):
+            found = _searched(ways, start, goal, settings, clock.time_limit)
     except TimeLimitError:
         return []
     if found is None:
@@ -81,7 +80,13 @@ def _turned(waypoints: Floats, first: float, last: float) -> Floats:
 
 
 def better_region(
-    region: Bools, size: float, start: Pose, goals: list[Pose], longest: float
+    region: Bools,
+    size: float,
+    start: Pose,
+    goals: list[Pose],
+    longest: float,
+    *,
+    clock: Clock | None = None,
 ) -> Bools:
     """Return the cells of a region through which a line may lead that is not longer.
 
@@ -94,6 +99,8 @@ def better_region(
     longest : float [m]
         Cells all of whose places are farther from the start and the nearest goal together are left
         out.
+    clock : Clock, optional
+        Once time is up, all of the region is returned.
 
     Examples
     --------
@@ -102,7 +109,11 @@ def better_region(
            [0, 1, 1, 1, 1, 1, 0],
            [0, 1, 1, 1, 1, 1, 0]])
     """
-    to_goal = reduce(np.minimum, (_away(region.shape, size, goal) for goal in goals))
+    to_goal = np.full(region.shape, math.inf)
+    for goal in goals:
+        if clock is not None and clock.is_up:
+            return region
+        np.minimum(to_goal, _away(region.shape, size, goal), out=to_goal)
     ways = _away(region.shape, size, start) + to_goal
     kept: Bools = region & (ways <= longest + math.sqrt(region.ndim) * size)
     return kept

@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
-from typing import Any, TypeAlias
+from typing import Any, NoReturn, TypeAlias
 
 import numpy as np
 from scipy import ndimage
 
-from groundmap.arrays import Bools, Floats
+from groundmap.arrays import Bools, Floats, Ints
 from planners.costmap import Costmap
 from planners.engine import Pose
 from planners.hybrid_parts import ground_of, shape_of
@@ -191,13 +191,27 @@ def box_of(region: Bools, size: float) -> Bounds:
     return tuple(size * float(edge) for edge in edges)
 
 
+class _Kept:
+    """Keeps the arrays alive whose address a check has: an address alone keeps nothing.
+
+    A deep copy or a pickle of the check would hold the address of arrays that it does not keep.
+    """
+
+    def __init__(self, table: Ints, arrays: list[Any]) -> None:
+        self.table, self.arrays = table, arrays
+
+    def __reduce__(self) -> NoReturn:
+        expected = "is_clear can't be copied or pickled: it holds the address of its own arrays"
+        raise TypeError(f"{expected}. Copy or pickle its Ways instead.")
+
+
 def _bound(check: Callable[..., bool], body: Body) -> Callable[..., bool]:
     """Return a check that is told once where the arrays are which it reads."""
     arrays = [np.ascontiguousarray(*pair) for pair in zip(body, KINDS, strict=True)]
     words = [(array.ctypes.data, *array.shape, 1)[:WORDS] for array in arrays]
     table = np.array(words, dtype=np.int64)
     bound = partial(check, table.ctypes.data)
-    vars(bound)["kept"] = table, arrays  # an address alone keeps nothing
+    vars(bound)["kept"] = _Kept(table, arrays)
     return bound
 
 

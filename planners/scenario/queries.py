@@ -56,7 +56,7 @@ class QuerySettings(Settings):
     planner: str = Field("astar", description="name of the planner")
     unknown: Unknown = Field("avoid", description="unknown and contested space")
     time_limit: float | None = Field(
-        None, ge=0, description="search time [s]; the planner's own unless told"
+        None, ge=0, description="time limit [s]; the planner's own unless told"
     )
     settings: dict[str, Any] = Field(
         default_factory=dict, description="of the planner, such as seed and iterations"
