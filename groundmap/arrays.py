@@ -122,6 +122,46 @@ def is_number(value: object) -> TypeGuard[float]:
         return False
 
 
+def as_number(
+    name: str,
+    value: object,
+    expected: str,
+    *,
+    least: float = -math.inf,
+    above: float = -math.inf,
+    error: type[InputError] = InputError,
+) -> float:
+    """Return a finite number as a float.
+
+    Parameters
+    ----------
+    name : str
+    value : object
+    expected : str
+        What the value should be, for the message.
+    least, above : float
+        The least number that is taken; the number that it must be above.
+    error : type of InputError, default InputError
+
+    Raises
+    ------
+    InputError
+        Not a number (`is_number`), or out of the range.
+
+    Examples
+    --------
+    >>> as_number("depth", 2, "a number above 0 [m]", above=0.0)
+    2.0
+    >>> as_number("depth", "2", "a number above 0 [m]", above=0.0)
+    Traceback (most recent call last):
+        ...
+    groundmap.errors.InputError: depth: expected a number above 0 [m], got '2'.
+    """
+    if not (is_number(value) and value >= least and value > above):
+        raise error(name, expected, repr(value)[:60])
+    return float(value)
+
+
 def check_finite(name: str, values: Floats, *, hint: str = "") -> None:
     """Raise `InputError` at the first value that is NaN or infinite."""
     wrong = ~np.isfinite(values)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import Bools, Floats, as_floats
+from groundmap.arrays import Bools, Floats, as_floats, as_number, is_number
 from groundmap.errors import CameraError
 from groundmap.frames import check_transform
 
@@ -66,15 +66,17 @@ class StereoRig:
     def __post_init__(self) -> None:
         units = {"fx": "px", "fy": "px", "baseline": "m", "pixel_noise_px": "px"}
         for name, unit in units.items():
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise CameraError(name, f"a number above 0 [{unit}]", str(value))
+            given, expected = getattr(self, name), f"a number above 0 [{unit}]"
+            value = as_number(name, given, expected, above=0.0, error=CameraError)
             if value > MOST:
                 raise CameraError(name, f"a number up to {MOST:g} [{unit}]", str(value))
-        if not (abs(self.cx) < MOST and abs(self.cy) < MOST):
-            raise CameraError(
-                "cx, cy", f"finite numbers [px], below {MOST:g}", f"{self.cx}, {self.cy}"
-            )
+            object.__setattr__(self, name, value)
+        for value in (self.cx, self.cy):
+            if not (is_number(value) and abs(value) < MOST):
+                expected = f"finite numbers [px], below {MOST:g}"
+                raise CameraError("cx, cy", expected, f"{self.cx!r:.60}, {self.cy!r:.60}")
+        object.__setattr__(self, "cx", float(self.cx))
+        object.__setattr__(self, "cy", float(self.cy))
         object.__setattr__(
             self, "T_base_camera", check_transform("T_base_camera", self.T_base_camera)
         )
@@ -115,12 +117,11 @@ class StereoRig:
         Depth is fx * baseline / disparity; the covariance is the Jacobian's, from independent
         noise of uL, uR and v (Matthies and Shafer 1987).
         """
-        array = np.asarray(pixels, dtype=np.float64)
-        ends = array.ndim == 3
-        array = as_floats("pixels", array, (None, 2, 3) if ends else (None, 3))
+        ends = _are_segments(pixels)
+        array = as_floats("pixels", pixels, (None, 2, 3) if ends else (None, 3))
         rows = array.reshape(len(array), 2 if ends else 1, 3)
         finite: Bools = np.logical_and.reduce(np.isfinite(rows), axis=(1, 2))
-        with np.errstate(invalid="ignore"):
+        with np.errstate(over="ignore", invalid="ignore"):
             disparity_px = rows[:, :, 0] - rows[:, :, 1]
             visible: Bools = np.logical_and.reduce(disparity_px > 0, axis=1)
         kept: Bools = finite & visible
@@ -130,7 +131,8 @@ class StereoRig:
                 "no_disparity": int((finite & ~visible).sum()),
             }
         )
-        with np.errstate(over="ignore", invalid="ignore"):  # a view drops what is not finite
+        # A view drops what is not finite.
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             xyz = self._points(rows[kept], disparity_px[kept])
             covariance = self._covariance(xyz, disparity_px[kept])
         shape = (len(xyz), 2) if ends else (len(xyz),)
@@ -152,4 +154,14 @@ class StereoRig:
         jacobian[..., :, 1] = -by_disparity
         jacobian[..., 0, 0] += scale
         jacobian[..., 1, 2] = scale * (self.fx / self.fy)
-        return self.pixel_noise_px**2 * (jacobian @ np.swapaxes(jacobian, -1, -2))
+        variance = np.square(np.float64(self.pixel_noise_px))  # infinite, not an OverflowError
+        covariance: Floats = variance * (jacobian @ np.swapaxes(jacobian, -1, -2))
+        return covariance
+
+
+def _are_segments(pixels: npt.ArrayLike) -> bool:
+    """Whether pixels are those of both ends of segments; what is ragged is neither."""
+    try:
+        return np.ndim(pixels) == 3
+    except ValueError:
+        return False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field, replace
+from numbers import Real
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -125,6 +126,8 @@ class View:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_map_base", check_transform("T_map_base", self.T_map_base))
+        if self.timestamp is not None and not isinstance(self.timestamp, (Real, np.floating)):
+            raise InputError("timestamp", "a number [s], or none", repr(self.timestamp)[:60])
         dropped = Counter(self.dropped)
         for name in ("points", "segments"):
             features: Features = getattr(self, name)
@@ -163,7 +166,7 @@ class View:
         points = rig.triangulate(as_floats("points_px", points_px, (None, 3)))
         segments = rig.triangulate(as_floats("segments_px", segments_px, (None, 2, 3)))
         return cls(
-            T_map_base=np.asarray(T_map_base, dtype=np.float64),
+            T_map_base=as_floats("T_map_base", T_map_base, (4, 4)),
             rig=rig,
             points=Features(
                 points.xyz, points.covariance, _kept(point_ids, points.kept, "point_ids")
@@ -248,11 +251,16 @@ def _kept(ids: npt.ArrayLike | None, kept: npt.NDArray[np.bool_], name: str) -> 
 
 
 def _as_ids(name: str, ids: npt.ArrayLike) -> Ints:
-    array = np.asarray(ids)
+    try:
+        array = np.asarray(ids)
+    except ValueError as error:
+        raise InputError(name, "whole numbers of shape (n,)", repr(ids)[:60]) from error
     if array.ndim != 1 or (array.size and array.dtype.kind not in "iu"):
         raise InputError(
             name, "whole numbers of shape (n,)", f"{array.dtype} of shape {array.shape}"
         )
+    if array.dtype.kind == "u" and (array > np.iinfo(np.int64).max).any():
+        raise InputError(name, "whole numbers within 64 bits", str(array.max()))
     return array.astype(np.int64)
 
 

@@ -6,16 +6,12 @@ import argparse
 import os
 import random
 import secrets
-import shutil
+import signal
 import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-
-# Before NumPy is loaded, here and in the workers: threads that spin would share the machine.
-for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(name, "1")
 
 from fuzz.case import Target, outcome_of
 from fuzz.draw import Draw
@@ -30,10 +26,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _options(arguments)
     if options.case is not None:
         return _one_case(options.only[0], options.seed, options.case)
-    chosen = [target for target in TARGETS.values() if not options.only or target.name in options.only]
+    chosen = [
+        target for target in TARGETS.values() if not options.only or target.name in options.only
+    ]
     files = [target for target in chosen if target.name in FILES]
     calls = [target for target in chosen if target.name in CALLS]
     print(f"seed {options.seed}", flush=True)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     summary = Summary(options.seed, options.keep)
     with tempfile.TemporaryDirectory() as folder:
         limits = Limits(options.timeout, options.memory)

@@ -20,6 +20,12 @@ TYPES = ("f4", "f8", "f2", ">f8", "i8", "u1", "?", "c16", "U9", "S3", "M8[s]", "
 SHAPES = ("(14, 2)", "(99999999999,)", "(-1,)", "()", "(0,)", "(2, 0)", "(3,)", "(1,1,1,1)",
           "(4000000000, 1000)", "(2.5,)", "[2]", "None", "(300000000,)", "(" * 300)  # fmt: skip
 
+VALUES: tuple[Any, ...] = (
+    None, [], {}, "", "x" * 3000, 1e400, float("nan"), -1, 0, 2**70, True, [1], [[0, 0]],
+    {"name": []}, [0, 0, 0], "\x00", "\ud800", 10**400, {"name": "capped", "cap": 2**70},
+    {"name": "capped", "cap": 1.5}, [1e300, 1e300], 1e-300, 1e300,
+)  # fmt: skip
+
 
 def damaged_archive(arrays: Mapping[str, Any], draw: Draw) -> bytes:
     """Return the bytes of an archive of these arrays after some damage."""
@@ -112,10 +118,7 @@ def _header(arrays: dict[str, Any], draw: Draw) -> None:
         key = draw.pick(sorted(values))
     except (ValueError, TypeError, IndexError):
         return None
-    odd = (None, [], {}, "", "x" * 3000, 1e400, float("nan"), -1, 0, 2**70, True, [1], [[0, 0]],
-           {"name": []}, [0, 0, 0], "\x00", "\ud800", 10**400, {"name": "capped", "cap": 2**70},
-           {"name": "capped", "cap": 1.5}, [1e300, 1e300], 1e-300, 1e300)  # fmt: skip
-    values[key] = draw.pick(odd)
+    values[key] = draw.pick(VALUES)
     if draw.chance(0.1):
         del values[key]
     arrays["header"] = np.array(json.dumps(values))
@@ -148,8 +151,8 @@ def _bytes(members: Members, draw: Draw) -> None:
 def _no_array(members: Members, draw: Draw) -> None:
     name = draw.pick(sorted(members))
     data = members.pop(name)
-    members[draw.pick((name, name.removesuffix(".npy"), "readme.txt", "a/", name.upper()))] = draw.pick(
-        (b"", b"hello", data[:6], data[:20], data + b"x")
+    members[draw.pick((name, name.removesuffix(".npy"), "readme.txt", "a/", name.upper()))] = (
+        draw.pick((b"", b"hello", data[:6], data[:20], data + b"x"))
     )
 
 

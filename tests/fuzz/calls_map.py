@@ -47,6 +47,7 @@ from groundmap.simulate.shapes import box, pole, polygon, table, wall
 OPTICAL = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.2], [0, 0, 0, 1]])
 PIXELS = np.array([[350.0, 300, 400], [300, 250, 420], [355, 300, 410], [320, 280, 250]])
 LINES = np.array([[[250.0, 180, 240], [300, 230, 260]], [[400, 370, 260], [450, 420, 300]]])
+PLAIN_RIG = StereoRig(fx=700, fy=700, cx=320, cy=240, baseline=0.5, T_base_camera=OPTICAL)
 SPREAD = np.diag([0.01, 0.01, 0.04])
 
 
@@ -134,9 +135,8 @@ def _mapped(seen: View, draw: Draw) -> None:
 def mapper_settings(draw: Draw, _folder: Path) -> None:
     """Map with odd settings."""
     mapper = GroundMapper(**settings_of(draw, MapperSettings))
-    given = View.from_pixels(np.eye(4), StereoRig(fx=700, fy=700, cx=320, cy=240, baseline=0.5,
-                             T_base_camera=OPTICAL), points_px=PIXELS, segments_px=LINES)  # fmt: skip
-    for one in fit_ground([given, given], **settings_of(draw, GroundSettings)):
+    seen = View.from_pixels(np.eye(4), PLAIN_RIG, points_px=PIXELS, segments_px=LINES)
+    for one in fit_ground([seen, seen], **settings_of(draw, GroundSettings)):
         mapper.integrate(one)
     use_map(mapper.grid)
 
@@ -219,7 +219,9 @@ def _merge(draw: Draw, on: ConfidenceGrid, _low: Any, _side: float, _folder: Pat
 
 
 def _export(draw: Draw, on: ConfidenceGrid, _low: Any, _side: float, folder: Path) -> None:
-    name = draw.noted("name", draw.pick(("m.npz", "m.yaml", "m", "", "a\x00.npz", "x" * 400 + ".npz")))
+    name = draw.noted(
+        "name", draw.pick(("m.npz", "m.yaml", "m", "", "a\x00.npz", "x" * 400 + ".npz"))
+    )
     export(on, f"{folder}/{name}")
 
 
@@ -271,17 +273,23 @@ def shapes(draw: Draw, _folder: Path) -> None:
     outline: Any = {
         "box": lambda: box(*(draw.noted("corner", number(draw, 0, 9, odds)) for _ in range(4))),
         "pole": lambda: pole(
-            number(draw, 0, 9, odds), number(draw, 0, 9, odds), radius=number(draw, 0.01, 1, 2 * odds)
+            number(draw, 0, 9, odds),
+            number(draw, 0, 9, odds),
+            radius=number(draw, 0.01, 1, 2 * odds),
         ),
-        "polygon": lambda: polygon(draw.noted("corners", array(draw, np.array([[0, 0], [2, 0], [1, 3.0]])))),
+        "polygon": lambda: polygon(
+            draw.noted("corners", array(draw, np.array([[0, 0], [2, 0], [1, 3.0]])))
+        ),
         "wall": lambda: wall(
             draw.noted("points", array(draw, np.array([[0, 0], [2, 0], [1, 3.0]]))),
             thickness=draw.noted("thickness", number(draw, 0.1, 1, 2 * odds)),
         ),
         "odd": lambda: odd(draw),
-        "table": lambda: table(
-            *(number(draw, 0, 9, odds) for _ in range(4)), height=number(draw, 0.3, 1)
-        )[0].outline,
+        "table": lambda: (
+            table(*(number(draw, 0, 9, odds) for _ in range(4)), height=number(draw, 0.3, 1))[
+                0
+            ].outline
+        ),
     }[draw.noted("shape", draw.pick(("box", "pole", "polygon", "wall", "odd", "table")))]()
     options: dict[str, Any] = {"top": number(draw, 1, 3, odds)}
     for name in ("bottom", "texture", "lines", "repeat"):
@@ -373,4 +381,3 @@ MAP_CALLS: tuple[Call, ...] = (
     Call("evaluate", evaluated, weight=0.2),
     Call("fit-ground", fitted),
 )
-

@@ -117,7 +117,9 @@ def widest(draw: Draw, _folder: Path) -> None:
 def reworked(draw: Draw, _folder: Path) -> None:
     """Pull a route tight, and round it."""
     posed = problem(draw, odds=0.02, yaw=0.3)
-    route = plan(posed, draw.pick(("astar", "astar", "theta", "jps", "hybrid_astar", "weighted_astar")))
+    route = plan(
+        posed, draw.pick(("astar", "astar", "theta", "jps", "hybrid_astar", "weighted_astar"))
+    )
     size = posed.grid.resolution
     if draw.chance(0.5):
         options: dict[str, Any] = {"clearance": draw.noted("clearance", number(draw, 0, 3 * size))}
@@ -155,7 +157,7 @@ def incremental(draw: Draw, _folder: Path) -> None:
     for _ in range(2):
         cell = np.array([draw.whole(0, 30), draw.whole(0, 30)])
         on.fuse(cell, np.full((1, 2), draw.pick((1.0, -1.0)), dtype=np.float32))
-        changed = [cell, cell + (0, 1)]
+        changed = [cell, cell + np.array([0, 1])]
         planner.update(draw.noted("changed", array(draw, np.array(changed), 0.3)))
         options: dict[str, Any] = {}
         if draw.chance(0.7):
@@ -168,8 +170,8 @@ def incremental(draw: Draw, _folder: Path) -> None:
 def roadmaps(draw: Draw, folder: Path) -> None:
     """Grow a roadmap, ask it, save and load it."""
     posed = problem(draw, odds=0.02)
-    seconds = draw.noted("seconds", draw.either(0.1, lambda: draw.pick((0, -1, float("nan"), "1", None)),
-                                                lambda: 0.3))  # fmt: skip
+    none: tuple[Any, ...] = (0, -1, float("nan"), "1", None)
+    seconds = draw.noted("seconds", draw.either(0.1, lambda: draw.pick(none), lambda: 0.3))
     given: dict[str, Any] = {"iterations": 20, "seed": 1} | settings(draw, ROADMAP, most=2)
     planner = draw.noted("planner", word(draw, "prm", "prmstar"))
     grown = Roadmap.grow(posed, seconds=seconds, planner=planner, **given)

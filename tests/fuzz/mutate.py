@@ -15,16 +15,22 @@ NUMBERS: tuple[bytes, ...] = (
     b"-9223372036854775809", b"18446744073709551616", b"0x10", b"0o7", b"0b1", b"1_000", b"1.",
     b".5", b"1e5", b"1,5", b"1.5.5", b"--1", b"1j", b"true", b"null", b"~", b"", b"''", b"'1'",
     b"9" * 5000, b"1" + b"0" * 400, b"0." + b"3" * 5000, b"1e" + b"9" * 30, b"1979-05-27",
-    b"2001-13-45", b"2001-12-14t21:59:43.10-05:00", b"07:32:00", b"1:30", b"\xd9\xa3", b"\xe2\x91\xa0",
+    b"2001-13-45", b"2001-12-14t21:59:43.10-05:00", b"07:32:00", b"1:30", b"\xd9\xa3",
+    b"\xe2\x91\xa0",
     b"\xc2\xb2", b"1\x00", b"[1]", b"{}", b"[[[]]]",
 )  # fmt: skip
 WORDS: tuple[bytes, ...] = (
-    b"", b" ", b"\t", b"#", b'"', b"'", b"=", b":", b",", b"[", b"]", b"{", b"}", b"\\", b"/", b"..",
+    b"", b" ", b"\t", b"#", b'"', b"'", b"=", b":", b",", b"[", b"]", b"{", b"}", b"\\", b"/",
+    b"..",
     b"\n", b"\r", b"\r\n", b"\x00", b"\x1b[2J", b"\x0c", b"\x85", b"\xe2\x80\xa8", b"\xe2\x80\xae",
-    b"\xef\xbb\xbf", b"\xff\xfe", b"\xed\xa0\x80", b"\xff", b"\xc3", b"\xf0\x9f\x9a\x97", b"[" * 2000,
-    b"{a: " * 1000, b"[" * 50_000, b"a." * 2000, b"&a", b"*a", b"<<: *a", b"!!python/object:os.system",
-    b"!!binary x", b"!!timestamp 1", b"!!float x", b"!!int ''", b"!!set {a}", b"? a", b"---", b"...",
-    b"%YAML 9.9", b'"\\ud800"', b'"\\U00110000"', b'"\\u0000"', b'"\\u202e"', b"a" * 300, b"a" * 70_000,
+    b"\xef\xbb\xbf", b"\xff\xfe", b"\xed\xa0\x80", b"\xff", b"\xc3", b"\xf0\x9f\x9a\x97",
+    b"[" * 2000,
+    b"{a: " * 1000, b"[" * 50_000, b"a." * 2000, b"&a", b"*a", b"<<: *a",
+    b"!!python/object:os.system",
+    b"!!binary x", b"!!timestamp 1", b"!!float x", b"!!int ''", b"!!set {a}", b"? a", b"---",
+    b"...",
+    b"%YAML 9.9", b'"\\ud800"', b'"\\U00110000"', b'"\\u0000"', b'"\\u202e"', b"a" * 300,
+    b"a" * 70_000,
     b"map.png", b"/dev/zero", b"/", b".", b"x/" * 3000, b"map", b"version 1", b"(a+)+$",
 )  # fmt: skip
 
@@ -148,7 +154,8 @@ def _ends(data: bytes, draw: Draw) -> bytes:
     if change == 1:
         return b"\xef\xbb\xbf" + data
     encoding = ("utf-16", "utf-32", "utf-7")[change - 2]
-    return data.decode("utf-8", "replace").encode(encoding, "replace")
+    encoded: bytes = data.decode("utf-8", "replace").encode(encoding, "replace")
+    return encoded
 
 
 def _words_of_size(data: bytes, draw: Draw) -> bytes:

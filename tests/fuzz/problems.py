@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from groundmap import ConfidenceGrid
 from groundmap.settings import Settings
 from planners import CostSettings, PlanningProblem
 
+SEQUENCES: tuple[Callable[[list[float]], Any], ...] = (tuple, list, np.array)
 SIDE = 24  # cells
 ORIGINS = ((0.0, 0.0), (0.0, 0.0), (-3.3, 7.7), (5.4e6, 3.1e5), (1e8, -1e8))
 OUTLINE = ((-0.5, -0.4), (1.0, -0.4), (1.0, 0.4), (-0.5, 0.4))  # shares of the drawn size
@@ -40,9 +42,12 @@ def place(draw: Draw, on: ConfidenceGrid, *, yaw: float = 0.5, odds: float = 0.1
     xy = [float(low) + draw.number(0.02, 0.98) * side for low in on.origin]
     if draw.chance(0.3):  # on a centre or a corner of a cell
         step = on.resolution / 2.0
-        xy = [float(low) + round((at - low) / step) * step for at, low in zip(xy, on.origin, strict=True)]
+        xy = [
+            float(low) + round((at - low) / step) * step
+            for at, low in zip(xy, on.origin, strict=True)
+        ]
     pose = [*xy, draw.number(-4.0, 4.0)] if draw.chance(yaw) else xy
-    return array(draw, draw.pick((tuple, list, np.array))(pose), share=odds)
+    return array(draw, draw.pick(SEQUENCES)(pose), share=odds)
 
 
 def footprint(draw: Draw, resolution: float, *, odds: float = 0.15) -> Any:
@@ -83,7 +88,12 @@ def problem(
 
 
 def settings_of(
-    draw: Draw, kind: type[Settings], *, most: int = 3, odds: float = 0.5, leave: tuple[str, ...] = ()
+    draw: Draw,
+    kind: type[Settings],
+    *,
+    most: int = 3,
+    odds: float = 0.5,
+    leave: tuple[str, ...] = (),
 ) -> dict[str, Any]:
     """Return some settings of a class, each its default, another size of it, or an odd value."""
     known = sorted(name for name in kind.model_fields if name not in leave)

@@ -58,9 +58,13 @@ class Texts(Reader):
         super().__init__(name, weight)
         self._files, self._read = files, read
 
+    def whole(self) -> Files:
+        """Return the files undamaged."""
+        return dict(self._files)
+
     def files(self, draw: Draw) -> Files:
         """Return the files, most often one of them damaged."""
-        files = dict(self._files)
+        files = self.whole()
         for _ in range(draw.pick((1, 1, 1, 2))):
             name = draw.pick(sorted(files))
             files[name] = damaged(files[name], draw)
@@ -90,8 +94,12 @@ class Archives(Reader):
         self._file, self._arrays, self._read = file, arrays, read
         self._beside = beside or {}
 
+    def whole(self) -> Files:
+        """Return the archive undamaged, and what lies beside it."""
+        return {**self._beside, self._file: archive(members_of(self._arrays()))}
+
     def files(self, draw: Draw) -> Files:
-        """Return the archive and what lies beside it."""
+        """Return the archive damaged, and what lies beside it."""
         return {**self._beside, self._file: damaged_archive(self._arrays(), draw)}
 
     def read(self, folder: Path) -> None:
@@ -102,8 +110,12 @@ class Archives(Reader):
 class RosMap(Reader):
     """A map of map_server: the text, the image, or both are damaged."""
 
-    def files(self, draw: Draw) -> Files:
+    def whole(self) -> Files:
         """Return a ``.yaml`` file and its image."""
+        return {"map.yaml": samples.YAML, "map.png": samples.picture("L", "PNG")}
+
+    def files(self, draw: Draw) -> Files:
+        """Return a ``.yaml`` file and its image, of which one is damaged, or both."""
         mode, kind = draw.pick(samples.PICTURES)
         text, image = samples.YAML, samples.picture(mode, kind)
         name = f"map.{kind.lower()}"
@@ -177,7 +189,7 @@ FOLDER: Files = {
 XYZ: Files = {**FOLDER, "points.csv": samples.POINTS_XYZ, "segments.csv": samples.SEGMENTS_XYZ}
 ARCHIVED: Files = {"rig.toml": samples.RIG, "poses.txt": samples.TUM}
 
-READERS: tuple[Reader, ...] = (
+READERS: tuple[Texts | Archives | RosMap, ...] = (
     Texts("gtsam", samples.GTSAM, _views, weight=2),
     Texts("folder", FOLDER, _views, weight=2),
     Texts("folder-xyz", XYZ, _views),
@@ -203,8 +215,3 @@ READERS: tuple[Reader, ...] = (
     Texts("settings", {"s.toml": samples.SETTINGS}, lambda f: read_settings(f / "s.toml")),
     Archives("roadmap", "roadmap.npz", samples.roadmap, _roadmap),
 )  # fmt: skip
-
-
-def whole_map() -> bytes:
-    """Return the bytes of a map file as it should be."""
-    return archive(members_of(samples.grids()["flat"]))

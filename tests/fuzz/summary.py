@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from collections import Counter, defaultdict
 from pathlib import Path
 
 from fuzz.pool import Report
 
+SAY_EVERY = 1000  # cases
 KEPT = 3  # failures of one kind whose files are kept
-ENDINGS = {"traceback": "tracebacks", "hang": "hangs", "ended": "ended processes", "memory": "over memory"}
+ENDINGS = {
+    "traceback": "tracebacks",
+    "hang": "hangs",
+    "ended": "ended processes",
+    "memory": "over memory",
+}
 
 
 class Summary:
@@ -38,6 +45,8 @@ class Summary:
         """Count a case; keep its files if it failed."""
         self._endings[report.ending] += 1
         self._peak = max(self._peak, report.megabytes)
+        if self._endings.total() % SAY_EVERY == 0:
+            print(f"{self._endings.total()} cases, {self.failures} failures", file=sys.stderr)
         if report.ending not in ENDINGS:
             return
         kind = self._kinds[report.ending, report.place]
@@ -55,8 +64,9 @@ class Summary:
             print(f"       --seed {self._seed} --only {first.target} --case {first.number}")
         counts = ", ".join(f"{self._endings[key]} {name}" for key, name in ENDINGS.items())
         print(
-            f"seed {self._seed}: {self._endings.total()} cases, {self._endings['refused']} refused, "
-            f"{self._endings['accepted']} accepted, {counts}, peak memory {self._peak:.0f} MB"
+            f"seed {self._seed}: {self._endings.total()} cases, "
+            f"{self._endings['refused']} refused, {self._endings['accepted']} accepted, "
+            f"{counts}, peak memory {self._peak:.0f} MB"
         )
         if self.failures:
             print(f"The failures are in {self._keep}.")
@@ -66,5 +76,7 @@ class Summary:
         folder.mkdir(parents=True, exist_ok=True)
         if report.folder is not None and report.folder.is_dir():
             shutil.copytree(report.folder, folder / "files", dirs_exist_ok=True)
-        story = f"--seed {self._seed} --only {report.target} --case {report.number}\n\n{report.text}\n"
+        story = (
+            f"--seed {self._seed} --only {report.target} --case {report.number}\n\n{report.text}\n"
+        )
         (folder / "failure.txt").write_text(story, encoding="utf-8", errors="backslashreplace")

@@ -10,5 +10,7 @@ from fuzz.commands import COMMANDS
 from fuzz.readers import READERS
 
 FILES: dict[str, Target] = {target.name: target for target in (*READERS, *COMMANDS)}
-CALLS: dict[str, Target] = {target.name: target for target in (*MAP_CALLS, *PLAN_CALLS, *DRAW_CALLS)}
+CALLS: dict[str, Target] = {
+    target.name: target for target in (*MAP_CALLS, *PLAN_CALLS, *DRAW_CALLS)
+}
 TARGETS = FILES | CALLS

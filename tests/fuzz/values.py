@@ -18,23 +18,28 @@ NUMBERS: tuple[Any, ...] = (
     2**63 - 1, -(2**63), 2**64, 10**30, 10**400, -(10**400), True, False,
 )  # fmt: skip
 SCALARS: tuple[Callable[[], Any], ...] = (
-    lambda: np.float32(0.5), lambda: np.float16(np.inf), lambda: np.int8(-1), lambda: np.bool_(True),
+    lambda: np.float32(0.5), lambda: np.float16(np.inf), lambda: np.int8(-1),
+    lambda: np.bool_(True),
     lambda: np.uint64(2**64 - 1), lambda: np.longdouble(2), lambda: np.array(1.0),
     lambda: np.array([1.0]), lambda: np.array(2), lambda: 1j, lambda: complex(np.nan, 0),
-    lambda: np.complex64(1), lambda: Decimal("NaN"), lambda: Decimal("sNaN"), lambda: Decimal("1.5"),
+    lambda: np.complex64(1), lambda: Decimal("NaN"), lambda: Decimal("sNaN"),
+    lambda: Decimal("1.5"),
     lambda: Decimal("1e999999"), lambda: Fraction(1, 3), lambda: Fraction(10**400),
     lambda: np.datetime64("NaT"), lambda: np.timedelta64(1, "s"),
 )  # fmt: skip
 OTHERS: tuple[Callable[[], Any], ...] = (
     lambda: None, lambda: "", lambda: "1", lambda: "nan", lambda: "map", lambda: "astar",
-    lambda: "a" * 5000, lambda: "a\x00b", lambda: "\ud800", lambda: "\u202egnp.map", lambda: "\x1b[2J",
-    lambda: b"1", lambda: b"", lambda: [], lambda: (), lambda: {}, lambda: set(), lambda: [1],
+    lambda: "a" * 5000, lambda: "a\x00b", lambda: "\ud800", lambda: "\u202egnp.map",
+    lambda: "\x1b[2J",
+    lambda: b"1", lambda: b"", list, tuple, dict, set, lambda: [1],
     lambda: [[1]], lambda: (1, 2), lambda: (1, 2, 3), lambda: [None, None], lambda: ["a", "b"],
     lambda: [(1, 2), (3,)], lambda: {"x": 1}, lambda: {1, 2}, object, lambda: range(3),
     lambda: iter([1.0, 2.0]), lambda: len, lambda: int, lambda: slice(0, 1), lambda: Ellipsis,
-    lambda: np.array([]), lambda: np.zeros((0, 3)), lambda: np.zeros((0, 2)), lambda: np.zeros((3, 0)),
+    lambda: np.array([]), lambda: np.zeros((0, 3)), lambda: np.zeros((0, 2)),
+    lambda: np.zeros((3, 0)),
     lambda: np.zeros((2, 2, 2)), lambda: np.array(None, dtype=object), lambda: np.array(["a", "b"]),
-    lambda: np.array([1 + 1j, 2]), lambda: np.array([None, 1]), lambda: np.array([10**400, 1], object),
+    lambda: np.array([1 + 1j, 2]), lambda: np.array([None, 1]), lambda: np.array([10**400, 1],
+    object),
     lambda: np.array([True, False]), lambda: np.ma.masked_array([1.0, 2.0], [True, False]),
     lambda: np.zeros(2, dtype=[("a", float)]), lambda: np.array(["NaT", "NaT"], "datetime64[s]"),
     lambda: np.zeros((1,) * 20), lambda: np.broadcast_to(1.0, (2,)), lambda: memoryview(b"ab"),
@@ -93,7 +98,9 @@ def _one_other(values: Any, draw: Draw) -> Any:
     values = values.astype(object)
     if values.size:
         flat = values.reshape(-1)
-        flat[draw.whole(0, values.size - 1) :][:1] = [draw.pick((None, "x", "1", 1j, 10**400, True))]
+        flat[draw.whole(0, values.size - 1) :][:1] = [
+            draw.pick((None, "x", "1", 1j, 10**400, True))
+        ]
     return values if draw.chance(0.5) else values.tolist()
 
 
