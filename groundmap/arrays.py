@@ -114,7 +114,9 @@ def is_number(value: object) -> TypeGuard[float]:
     >>> is_number(2), is_number(np.float32(0.5)), is_number(True), is_number("2"), is_number(np.nan)
     (True, True, False, False, False)
     """
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (Real, np.floating)):
+    if isinstance(value, (bool, np.bool_, np.timedelta64)):  # NumPy counts durations as whole
+        return False
+    if not isinstance(value, (Real, np.floating)):
         return False
     try:
         return math.isfinite(float(value))

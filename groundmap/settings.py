@@ -11,6 +11,7 @@ from groundmap.errors import SettingsError
 from groundmap.printable import shown
 
 MOST_CELLS_OF_RANGE = 4000  # a view's block then has 64 million cells
+LARGEST = 1e9  # of any number: squares and sums of such are still exact enough, and finite
 
 
 class Settings(BaseModel):
@@ -52,6 +53,9 @@ unknown key. Did you mean 'resolution'?
                 raise SettingsError(name, "a value", "none") from None
             expected = first["msg"].removeprefix("Input should be ")
             raise SettingsError(name, expected, shown(first["input"])) from None
+        for name, value in self:
+            if isinstance(value, float) and abs(value) > LARGEST:
+                raise SettingsError(name, f"a number within {LARGEST:g}", f"{value:g}")
         self.check()
 
     def check(self) -> None:
@@ -140,7 +144,9 @@ class MapperSettings(Settings):
 class GroundSettings(Settings):
     """All that `groundmap.fit_ground` can be told."""
 
-    window: int = Field(11, ge=1, description="views that one plane is fitted to [views]")
+    window: int = Field(
+        11, ge=1, le=10_000, description="views that one plane is fitted to [views]"
+    )
     causal: bool = Field(False, description="use earlier views only, as a live mapper must")
     max_range: float = Field(20.0, gt=0, description="farther features are left out [m]")
     lowest_camera: float = Field(0.1, gt=0, description="least height of the camera [m]")

@@ -75,7 +75,8 @@ def shortcut(problem: PlanningProblem, route: Route, *, clearance: float | None 
     if clearance is not None and not (is_number(clearance) and clearance >= 0):
         raise ProblemError("clearance", "a distance of 0 or more [m]", repr(clearance))
     costmap = checked(problem, route)
-    line = tightened(costmap, route.waypoints, clearance=clearance)
+    kept = None if clearance is None else float(clearance)
+    line = tightened(costmap, route.waypoints, clearance=kept)
     saved = cost_of(costmap, route.waypoints) - cost_of(costmap, line)
     cost = length_of(line) if costmap.uniform else route.cost - saved
     found = Found(line, route.expanded, bound=route.bound, cost=cost)

@@ -54,7 +54,8 @@ def draw_graph(
     if wrong.any():
         first = int(wrong.argmax())
         expected = f"indices of {len(places)} vertices"
-        raise InputError("edges", expected, str(indices[first].tolist()), where=f"row {first}")
+        got = f"[{indices[first, 0]:g}, {indices[first, 1]:g}]"
+        raise InputError("edges", expected, got, where=f"row {first}")
     joined = indices.astype(np.int64)
     segments: Any = places[joined][..., :2]
     many = len(joined) >= MANY

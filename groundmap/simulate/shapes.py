@@ -10,7 +10,7 @@ import shapely
 
 from groundmap.arrays import as_floats, as_number, check_finite
 from groundmap.errors import InputError
-from groundmap.simulate.world import Solid
+from groundmap.simulate.world import FARTHEST, Solid
 
 POLE_SIDES = 12
 LEG, SLAB = 0.06, 0.05  # [m], of a table
@@ -57,9 +57,14 @@ def wall(points: npt.ArrayLike, *, thickness: float = 0.2) -> shapely.Polygon:
     """
     corners = as_floats("wall", points, (None, 2))
     check_finite("wall", corners)
+    farthest = np.abs(corners).max(initial=0.0)
+    if farthest > FARTHEST:
+        raise InputError("wall", f"corners within {FARTHEST:g} m", f"{farthest:g} m")
     if len(corners) < 2:
         raise InputError("wall", "two corners or more [m]", str(len(corners)))
-    thickness = as_number("thickness", thickness, "a number [m]")
+    thickness = as_number("thickness", thickness, f"a number up to {FARTHEST:g} [m]")
+    if thickness > FARTHEST:
+        raise InputError("thickness", f"a number up to {FARTHEST:g} [m]", f"{thickness:g}")
     line = shapely.LineString(corners)
     outline: shapely.Polygon = line.buffer(
         thickness / 2.0, cap_style="flat", join_style="mitre", single_sided=False

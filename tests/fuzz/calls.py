@@ -21,16 +21,30 @@ class Call(Target):
     body : callable
         Called with the case's random choices and an empty folder.
     weight : float
+    warm : callable, optional
+        Compiles and loads what the cases need.
     may_fail_on_disk : bool
         Whether OSError is documented, because files are written.
     """
 
     def __init__(
-        self, name: str, body: Body, *, weight: float = 1.0, may_fail_on_disk: bool = False
+        self,
+        name: str,
+        body: Body,
+        *,
+        weight: float = 1.0,
+        warm: Callable[[], object] | None = None,
+        may_fail_on_disk: bool = False,
     ) -> None:
         super().__init__(name, weight)
-        self._body = body
+        self._body, self._warm = body, warm
         self._allowed: tuple[type[Exception], ...] = (OSError,) if may_fail_on_disk else ()
+
+    def warm_up(self, folder: Path) -> None:
+        """Compile and load what the cases need."""
+        if self._warm is not None:
+            self._warm()
+        super().warm_up(folder)
 
     def run(self, draw: Draw, folder: Path) -> None:
         """Call it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Any
 
@@ -9,13 +10,25 @@ import numpy as np
 
 from fuzz.calls import Call
 from fuzz.draw import Draw
-from fuzz.problems import footprint, grid, place, problem, settings_of
+from fuzz.problems import (
+    OUTLINE,
+    SIDE,
+    footprint,
+    free_grid,
+    grid,
+    place,
+    problem,
+    settings_of,
+)
 from fuzz.values import array, flag, number, odd, settings, word
+from groundmap.errors import GroundmapError
 from planners import (
     OWN_PLANNERS,
+    CostSettings,
     Footprint,
     IncrementalPlanner,
     NoRouteError,
+    PlanningError,
     PlanningProblem,
     Roadmap,
     Route,
@@ -201,11 +214,31 @@ def improving(draw: Draw, _folder: Path) -> None:
     plan(posed, draw.pick(("ara", "astar")), on_improved=told, cancel=cancel, time_limit=1.0)
 
 
+def _compiled(names: tuple[str, ...], **given: Any) -> None:
+    """Have planners compile, or load, all that they need on flat and on deep maps."""
+    flat, deep = (free_grid(shape) for shape in ((SIDE, SIDE), (8, 8, 8)))
+    for name in names:
+        for shape, costs in ((0.9, CostSettings(clearance_weight=2.0)), (OUTLINE, CostSettings())):
+            asked = PlanningProblem(
+                flat, start=(3, 3, 0), goal=(9, 8, 1), footprint=shape, costs=costs
+            )
+            with contextlib.suppress(PlanningError, GroundmapError):
+                plan(asked, name, **given)
+        with contextlib.suppress(PlanningError, GroundmapError):
+            start, goal = (1, 1, 1), (3, 3, 3)
+            plan(PlanningProblem(deep, start=start, goal=goal, footprint=0.4), name, **given)
+
+
 PLAN_CALLS: tuple[Call, ...] = (
     Call("footprint", footprints, weight=2),
     Call("problem", problems, weight=3),
-    Call("plan", own_planners, weight=5),
-    Call("plan-sampling", sampling_planners, weight=0.3),
+    Call("plan", own_planners, weight=5, warm=lambda: _compiled(OWN)),
+    Call(
+        "plan-sampling",
+        sampling_planners,
+        weight=0.3,
+        warm=lambda: _compiled(SAMPLING, time_limit=1.0, iterations=50),
+    ),
     Call("plan-many", many, weight=1),
     Call("fields", fields, weight=1.5),
     Call("widest", widest, weight=0.7),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from typing import Literal
 
 from fuzz.draw import Draw
 
@@ -165,7 +166,8 @@ def _words_of_size(data: bytes, draw: Draw) -> bytes:
         return data
     at = draw.whole(0, len(data) - size)
     value = draw.pick((0, 1, 2**15, 2**16 - 1, 2**31, 2**32 - 1)) % 2 ** (8 * size)
-    return data[:at] + value.to_bytes(size, draw.pick(("little", "big"))) + data[at + size :]
+    orders: tuple[Literal["little", "big"], ...] = ("little", "big")
+    return data[:at] + value.to_bytes(size, draw.pick(orders)) + data[at + size :]
 
 
 Damage = Callable[[bytes, Draw], bytes]

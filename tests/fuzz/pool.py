@@ -78,6 +78,7 @@ class Pool:
     ) -> None:
         self._start, self._folder, self._limits = start, folder, limits
         self._born = 0
+        self._slow: set[tuple[str, int]] = set()  # cases that took too long once
         self._returned: list[Job] = []  # what workers that were replaced did not get to
         self._workers = [self._new() for _ in range(workers)]
 
@@ -149,6 +150,11 @@ class Pool:
         if not worker.warm or worker.left is None:
             raise RuntimeError("A worker ended while it was running no case: see its traceback.")
         target, number = worker.left.target, worker.left.numbers[0]
+        if ending == "hang" and (target, number) not in self._slow:
+            # Once more: it may have compiled something, or the machine was busy.
+            self._slow.add((target, number))
+            self._replace(place)
+            return
         self._done(worker)
         code = self._replace(place)
         text = f"{target}, case {number}: {ending}, exit code {code}"

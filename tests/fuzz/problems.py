@@ -36,6 +36,13 @@ def grid(draw: Draw, *, flat: bool = True) -> ConfidenceGrid:
     return made
 
 
+def free_grid(shape: tuple[int, ...]) -> ConfidenceGrid:
+    """Return a map on which every cell is free, with cells of 0.5 m."""
+    made = ConfidenceGrid(resolution=0.5, origin=(0.0,) * len(shape))
+    made.fuse(np.zeros(len(shape), dtype=np.int64), np.full(shape, -1.0, dtype=np.float32))
+    return made
+
+
 def place(draw: Draw, on: ConfidenceGrid, *, yaw: float = 0.5, odds: float = 0.1) -> Any:
     """Return a place on a map, with a yaw in some cases, or an odd value."""
     side = (SIDE if on.ndim == 2 else 8) * on.resolution
