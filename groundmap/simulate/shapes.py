@@ -24,9 +24,8 @@ def box(x0: float, y0: float, x1: float, y1: float) -> shapely.Polygon:
     InputError
         Corners that do not differ in both coordinates.
     """
-    corners = as_floats("box", (x0, y0, x1, y1), (4,))
-    check_finite("box", corners)
-    x0, y0, x1, y1 = corners.tolist()
+    corners = (as_number("box", value, "two opposite corners [m]") for value in (x0, y0, x1, y1))
+    x0, y0, x1, y1 = corners
     if x0 == x1 or y0 == y1:
         raise InputError("box", "two opposite corners [m]", f"{(x0, y0, x1, y1)}")
     return shapely.box(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))

@@ -165,7 +165,7 @@ def _words_of_size(data: bytes, draw: Draw) -> bytes:
     if len(data) < size:
         return data
     at = draw.whole(0, len(data) - size)
-    value = draw.pick((0, 1, 2**15, 2**16 - 1, 2**31, 2**32 - 1)) % 2 ** (8 * size)
+    value: int = draw.pick((0, 1, 2**15, 2**16 - 1, 2**31, 2**32 - 1)) % 2 ** (8 * size)
     orders: tuple[Literal["little", "big"], ...] = ("little", "big")
     return data[:at] + value.to_bytes(size, draw.pick(orders)) + data[at + size :]
 
