@@ -1,6 +1,9 @@
 PYTHON ?= python3
 WORKERS ?= auto
 ATTEMPTS ?= 2000
+FILES ?= 10000
+CALLS ?= 10000
+SECONDS ?= inf
 SEED ?=
 
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
@@ -10,7 +13,7 @@ INSTALLED := .venv/.installed
 READY := .venv/.ready
 WHEEL_VENV := .wheel-venv
 
-.PHONY: help setup demo test check crash-matrix size wheel-test clean
+.PHONY: help setup demo test check crash-matrix fuzz size wheel-test clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "%-12s %s\n", $$1, $$2}' Makefile
@@ -45,6 +48,10 @@ crash-matrix: $(READY) ## Plan at random in processes that may crash (ATTEMPTS=2
 size: $(READY) ## Print lines per module, longest functions, public names, layers
 	@$(BIN)/python tools/size.py
 
+fuzz: $(READY) ## Fuzz readers and API (FILES, CALLS, SECONDS, SEED), then seek new examples
+	cd tests && PYTHONPATH=. '$(CURDIR)/$(BIN)/python' -m fuzz --files $(FILES) --calls $(CALLS) --seconds $(SECONDS) $(addprefix --seed ,$(SEED)) --keep '$(CURDIR)/fuzz-failures'
+	$(BIN)/pytest -n $(WORKERS) -m hypothesis --hypothesis-profile=explore
+
 wheel-test: $(READY) ## Build the wheel, install it alone, run the tests against it
 	rm -rf dist
 	$(BIN)/python -m build --wheel --no-isolation --outdir dist
@@ -52,5 +59,5 @@ wheel-test: $(READY) ## Build the wheel, install it alone, run the tests against
 	cd $(WHEEL_VENV) && bin/pytest -n $(WORKERS) -c '$(CURDIR)/pyproject.toml' --installed '$(CURDIR)/tests' '$(CURDIR)/scenarios' --pyargs groundmap planners
 
 clean: ## Remove everything that the other targets made
-	rm -rf .venv $(WHEEL_VENV) dist groundmap-demo .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf .venv $(WHEEL_VENV) dist groundmap-demo fuzz-failures .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find groundmap planners tests tools -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -114,12 +114,54 @@ def is_number(value: object) -> TypeGuard[float]:
     >>> is_number(2), is_number(np.float32(0.5)), is_number(True), is_number("2"), is_number(np.nan)
     (True, True, False, False, False)
     """
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (Real, np.floating)):
+    if isinstance(value, (bool, np.bool_, np.timedelta64)):  # NumPy counts durations as whole
+        return False
+    if not isinstance(value, (Real, np.floating)):
         return False
     try:
         return math.isfinite(float(value))
     except OverflowError:  # a whole number beyond what a float holds
         return False
+
+
+def as_number(
+    name: str,
+    value: object,
+    expected: str,
+    *,
+    least: float = -math.inf,
+    above: float = -math.inf,
+    error: type[InputError] = InputError,
+) -> float:
+    """Return a finite number as a float.
+
+    Parameters
+    ----------
+    name : str
+    value : object
+    expected : str
+        What the value should be, for the message.
+    least, above : float
+        The least number that is taken; the number that it must be above.
+    error : type of InputError, default InputError
+
+    Raises
+    ------
+    InputError
+        Not a number (`is_number`), or out of the range.
+
+    Examples
+    --------
+    >>> as_number("depth", 2, "a number above 0 [m]", above=0.0)
+    2.0
+    >>> as_number("depth", "2", "a number above 0 [m]", above=0.0)
+    Traceback (most recent call last):
+        ...
+    groundmap.errors.InputError: depth: expected a number above 0 [m], got '2'.
+    """
+    if not (is_number(value) and value >= least and value > above):
+        raise error(name, expected, repr(value)[:60])
+    return float(value)
 
 
 def check_finite(name: str, values: Floats, *, hint: str = "") -> None:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import Bools, Floats, as_floats, as_numbers, is_number
+from groundmap.arrays import Bools, Floats, as_floats, as_number, as_numbers, is_number
 from groundmap.errors import CameraError
 from groundmap.frames import check_transform
 from groundmap.printable import shown
@@ -67,17 +67,17 @@ class StereoRig:
     def __post_init__(self) -> None:
         units = {"fx": "px", "fy": "px", "baseline": "m", "pixel_noise_px": "px"}
         for name, unit in units.items():
-            value = getattr(self, name)
-            if not (is_number(value) and value > 0):
-                raise CameraError(name, f"a number above 0 [{unit}]", shown(value))
+            given, expected = getattr(self, name), f"a number above 0 [{unit}]"
+            value = as_number(name, given, expected, above=0.0, error=CameraError)
             if value > MOST:
                 raise CameraError(name, f"a number up to {MOST:g} [{unit}]", shown(value))
-        if not all(is_number(value) and abs(value) < MOST for value in (self.cx, self.cy)):
-            raise CameraError(
-                "cx, cy",
-                f"finite numbers [px], below {MOST:g}",
-                f"{shown(self.cx)}, {shown(self.cy)}",
-            )
+            object.__setattr__(self, name, value)
+        for value in (self.cx, self.cy):
+            if not (is_number(value) and abs(value) < MOST):
+                expected = f"finite numbers [px], below {MOST:g}"
+                raise CameraError("cx, cy", expected, f"{shown(self.cx)}, {shown(self.cy)}")
+        object.__setattr__(self, "cx", float(self.cx))
+        object.__setattr__(self, "cy", float(self.cy))
         object.__setattr__(
             self, "T_base_camera", check_transform("T_base_camera", self.T_base_camera)
         )
@@ -133,7 +133,8 @@ class StereoRig:
                 "no_disparity": int((finite & ~visible).sum()),
             }
         )
-        with np.errstate(over="ignore", invalid="ignore"):  # a view drops what is not finite
+        # A view drops what is not finite.
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             xyz = self._points(rows[kept], disparity_px[kept])
             covariance = self._covariance(xyz, disparity_px[kept])
         shape = (len(xyz), 2) if ends else (len(xyz),)

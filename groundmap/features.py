@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field, replace
+from numbers import Real
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -126,6 +127,8 @@ class View:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_map_base", check_transform("T_map_base", self.T_map_base))
+        if self.timestamp is not None and not isinstance(self.timestamp, (Real, np.floating)):
+            raise InputError("timestamp", "a number [s], or none", repr(self.timestamp)[:60])
         dropped = Counter(self.dropped)
         for name in ("points", "segments"):
             features: Features = getattr(self, name)
@@ -251,11 +254,16 @@ def _kept(ids: npt.ArrayLike | None, kept: npt.NDArray[np.bool_], name: str) -> 
 
 
 def _as_ids(name: str, ids: npt.ArrayLike) -> Ints:
-    array = np.asarray(ids)
+    try:
+        array = np.asarray(ids)
+    except ValueError as error:
+        raise InputError(name, "whole numbers of shape (n,)", repr(ids)[:60]) from error
     if array.ndim != 1 or (array.size and array.dtype.kind not in "iu"):
         raise InputError(
             name, "whole numbers of shape (n,)", f"{array.dtype} of shape {array.shape}"
         )
+    if array.dtype.kind == "u" and (array > np.iinfo(np.int64).max).any():
+        raise InputError(name, "whole numbers within 64 bits", str(array.max()))
     return array.astype(np.int64)
 
 

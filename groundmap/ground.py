@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from groundmap.arrays import Floats, as_floats, check_finite, is_number
+from groundmap.arrays import Floats, as_floats, as_number, check_finite, is_number
 from groundmap.camera import StereoRig
 from groundmap.errors import InputError, NoGroundPlaneError
 from groundmap.features import View
@@ -54,21 +54,23 @@ class GroundPlane:
         check_finite("normal", normal)
         with np.errstate(over="ignore"):
             length = float(np.linalg.norm(normal))
-        if abs(length - 1.0) > 1e-6:
+        if not abs(length - 1.0) <= 1e-6:
             raise InputError("normal", "a vector of length 1", f"length {length:.6g}")
         if not (is_number(self.offset) and is_number(self.sigma_tilt) and self.sigma_tilt >= 0):
             raise InputError(
                 "plane",
                 "a finite offset [m] and a sigma_tilt of 0 or more [rad]",
-                f"{self.offset}, {self.sigma_tilt}",
+                f"{self.offset!r:.60}, {self.sigma_tilt!r:.60}",
             )
+        object.__setattr__(self, "offset", float(self.offset))
+        object.__setattr__(self, "sigma_tilt", float(self.sigma_tilt))
         object.__setattr__(self, "normal", normal)
 
     @classmethod
     def below_camera(cls, rig: StereoRig, camera_height: float) -> GroundPlane:
         """Return the level ground that lies `camera_height` [m] below the left camera."""
-        if not (is_number(camera_height) and camera_height > 0):
-            raise InputError("camera_height", "a number above 0 [m]", str(camera_height)[:60])
+        expected = "a number above 0 [m]"
+        camera_height = as_number("camera_height", camera_height, expected, above=0.0)
         offset = camera_height - float(rig.up @ rig.T_base_camera[:3, 3])
         return cls(normal=rig.up, offset=offset)
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from groundmap.arrays import Floats
+from groundmap.arrays import Floats, as_number
 from groundmap.camera import StereoRig
 from groundmap.diagnosis import describe_dropped, likely_mistakes, upright_views
 from groundmap.errors import InputError, NoGroundPlaneError
@@ -71,6 +71,9 @@ def fit_ground(
         (`T_base_camera` is given), ``base_link`` itself tells where the ground is.
     """
     options = GroundSettings(**settings)
+    if camera_height is not None:
+        expected = "a number above 0 [m]"
+        camera_height = as_number("camera_height", camera_height, expected, above=0.0)
     if plane is not None and camera_height is not None:
         raise InputError("fit_ground", "plane or camera_height", "both")
     if plane is not None or camera_height is not None:

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from groundmap.errors import SettingsError
 from groundmap.printable import shown
 
+LARGEST_NUMBER = 1e9  # of any setting: squares and sums of such are still exact enough, and finite
 LARGEST = 1e4  # of lengths [m], ratios and angles: nothing that a rig sees needs more
 FINEST = 4_000  # cells, or samples, along max_range: a view's block then has 64 million cells
 
@@ -53,6 +54,9 @@ unknown key. Did you mean 'resolution'?
                 raise SettingsError(name, "a value", "none") from None
             expected = first["msg"].removeprefix("Input should be ")
             raise SettingsError(name, expected, shown(first["input"])) from None
+        for name, value in self:
+            if isinstance(value, float) and abs(value) > LARGEST_NUMBER:
+                raise SettingsError(name, f"a number within {LARGEST_NUMBER:g}", f"{value:g}")
         self.check()
 
     def check(self) -> None:

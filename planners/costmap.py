@@ -258,12 +258,16 @@ def whole_cells(changed: npt.ArrayLike) -> Ints:
     ProblemError
         Another shape, or not whole numbers.
     """
-    cells = np.asarray(changed)
+    expected = "whole numbers [row, col], shape (n, 2)"
+    try:
+        cells = np.asarray(changed)
+    except ValueError as error:
+        raise ProblemError("changed", expected, repr(changed)[:60]) from error
     if cells.size == 0:
         return np.empty((0, 2), dtype=np.int64)
     if cells.ndim != 2 or cells.shape[1] != 2 or cells.dtype.kind not in "iu":
         got = f"shape {cells.shape} of {cells.dtype}"
-        raise ProblemError("changed", "whole numbers [row, col], shape (n, 2)", got)
+        raise ProblemError("changed", expected, got)
     return cells.astype(np.int64)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
 
 from pydantic import Field
 
-from groundmap.arrays import Floats
+from groundmap.arrays import Floats, is_number
 from groundmap.settings import Settings
 from planners.costmap import Costmap
 from planners.errors import CancelledError, ProblemError, TimeLimitError
@@ -89,6 +89,21 @@ def check_cancel(cancel: Any) -> None:
     """
     if cancel is not None and not callable(getattr(cancel, "is_set", None)):
         raise ProblemError("cancel", "a threading.Event", repr(cancel))
+
+
+def checked_limit(time_limit: Any) -> float | None:
+    """Return a time limit [s] that is given outside of settings, or None for no limit.
+
+    Raises
+    ------
+    ProblemError
+        Not a number of 0 or more.
+    """
+    if time_limit is None:
+        return None
+    if not (is_number(time_limit) and time_limit >= 0):
+        raise ProblemError("time_limit", "a number of 0 or more [s], or none", repr(time_limit))
+    return float(time_limit)
 
 
 class Engine(Protocol):

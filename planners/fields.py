@@ -9,7 +9,7 @@ import numpy as np
 from groundmap.arrays import Bools, Floats, Ints, is_number
 from planners.costmap import Costmap
 from planners.ends import ends_of
-from planners.engine import SLICE, Clock
+from planners.engine import SLICE, Clock, checked_limit
 from planners.errors import ProblemError
 from planners.kernels.astar import FAR, ONE
 from planners.kernels.field import NOBODY, ONE_BITS, SETTLED, seed, settle
@@ -62,7 +62,7 @@ def distance_field(
     (7.828, inf)
     """
     costmap, (x, y) = _costmap(space), _place("source", source)
-    clock = Clock("distance_field", time_limit)
+    clock = Clock("distance_field", checked_limit(time_limit))
     clock.check(0)
     sources = ends_of(costmap, (x, y), (x, y)).sources
     dearest = max(int(costmap.steps.max()), int(sources[:, 2].max(initial=0)))
@@ -138,14 +138,11 @@ def _costmap(space: PlanningProblem | Costmap) -> Costmap:
 
 
 def _place(name: str, values: Sequence[float] | Floats) -> tuple[float, float]:
-    expected = "x, y [m], finite"
-    try:
-        x, y = (float(value) for value in values[:2])
-    except (TypeError, ValueError) as error:
-        raise ProblemError(name, expected, repr(values)) from error
-    if not (np.isfinite(x) and np.isfinite(y)):
-        raise ProblemError(name, expected, repr(values))
-    return x, y
+    places = isinstance(values, np.ndarray) and values.ndim == 1
+    places |= isinstance(values, Sequence) and not isinstance(values, str)
+    if not places or len(values) < 2 or not all(map(is_number, values[:2])):
+        raise ProblemError(name, "x, y [m], finite", repr(values))
+    return float(values[0]), float(values[1])
 
 
 def _metres(labels: Ints, costmap: Costmap) -> Floats:

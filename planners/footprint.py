@@ -9,11 +9,13 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from groundmap.arrays import Floats
+from groundmap.arrays import Floats, as_floats, is_number
+from groundmap.errors import InputError
 from planners.errors import ProblemError
 
 EXPECTED = "a radius of 0 or more [m], or 3 or more points x, y [m, base_link] of a simple polygon"
 MOST_DISCS = 16  # to cover a polygon with
+LARGEST = 1e6  # [m]
 FLAT = 1e-12  # area, as a share of the squared extent, below which a polygon is a line
 
 
@@ -60,19 +62,26 @@ points x, y [m, base_link] of a simple polygon, got one that meets itself at (0.
             Not numbers, not finite, a negative radius, fewer than 3 points, no area, or an
             outline that meets itself.
         """
-        if isinstance(value, (bool, str)):
-            raise _refusal(repr(value))
+        if is_number(value):
+            return cls._of_radius(float(value))
+        if isinstance(value, np.ndarray) and value.shape == ():
+            return cls.of(value.item())
+        if np.isscalar(value):
+            raise _refusal(repr(value)[:60])
         try:
-            array = np.asarray(value, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise _refusal(repr(value)[:60]) from error
-        if not np.isfinite(array).all():
-            raise _refusal("a number that is not finite" if array.ndim else repr(value))
-        return cls._of_radius(float(array)) if array.ndim == 0 else cls._of_polygon(array)
+            corners = as_floats("footprint", value, (None, 2))
+        except InputError as error:
+            raise _refusal(error.got) from error
+        if not np.isfinite(corners).all():
+            raise _refusal("a number that is not finite")
+        farthest = float(np.abs(corners).max(initial=0.0))
+        if farthest > LARGEST:
+            raise _refusal(f"a corner {farthest:g} m away")
+        return cls._of_polygon(corners)
 
     @classmethod
     def _of_radius(cls, radius: float) -> Footprint:
-        if radius < 0:
+        if not 0 <= radius <= LARGEST:
             raise _refusal(repr(radius))
         return cls(None, radius, radius)
 

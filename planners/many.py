@@ -93,6 +93,8 @@ def plan_many(
     UnknownSpaceError
     7.0
     """
+    if not isinstance(audit, bool):
+        raise ProblemError("audit", "True or False", repr(audit))
     chosen = named(planner)
     options = chosen.settings(**settings)
     headings = chosen.headings and options.heeds_headings(problem)
@@ -125,6 +127,8 @@ def _problems(
         raise ProblemError(
             "grid", "a 2-D map", f"a {problem.grid.ndim}-D one", hint="Use `plan` for each pair."
         )
+    if not isinstance(pairs, Iterable):
+        raise ProblemError("pairs", "pairs of a start and a goal", repr(pairs))
     problems = []
     for i, pair in enumerate(pairs):
         try:
@@ -145,7 +149,7 @@ def _problems(
 def _threads(threads: int | None) -> int:
     if threads is None:  # Python 3.13 knows how many of them this process may use
         return getattr(os, "process_cpu_count", os.cpu_count)() or 1
-    if not isinstance(threads, int) or threads < 1:
+    if not isinstance(threads, int) or isinstance(threads, bool) or threads < 1:
         raise ProblemError("threads", "a whole number of 1 or more", repr(threads))
     return threads
 

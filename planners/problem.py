@@ -14,7 +14,7 @@ from groundmap.grid import ConfidenceGrid
 from groundmap.window import EPSILON
 from planners.costs import CostSettings
 from planners.errors import ProblemError
-from planners.footprint import Footprint
+from planners.footprint import LARGEST, Footprint
 from planners.wording import Point
 
 PLAIN = CostSettings()  # the shortest route is the best
@@ -102,7 +102,7 @@ got (0, nan).
         if self.cleared_at is not None:
             place = _pose("cleared_at", self.cleared_at, self.grid.ndim)
             object.__setattr__(self, "cleared_at", place)
-        if self.unknown not in get_args(Unknown):
+        if not isinstance(self.unknown, str) or self.unknown not in get_args(Unknown):
             expected = "'avoid', 'allow' or 'penalise'"
             raise ProblemError("unknown", expected, repr(self.unknown))
         if not isinstance(self.clear_start, bool):
@@ -158,18 +158,14 @@ got (0, nan).
 def _pose(name: str, values: Sequence[float] | Floats, ndim: int) -> tuple[float, ...]:
     axes = "x, y" if ndim == 2 else "x, y, z"
     expected = f"{axes} [m] and optionally yaw [rad], all finite"
-    if not isinstance(values, (Sequence, np.ndarray)) or isinstance(values, str):
+    places = isinstance(values, np.ndarray) and values.ndim == 1
+    places |= isinstance(values, Sequence) and not isinstance(values, str)
+    if not places or len(values) not in (ndim, ndim + 1) or not all(map(is_number, values)):
         raise ProblemError(name, expected, repr(values))
-    try:
-        pose = () if isinstance(values, str) else tuple(float(value) for value in values)
-    except (TypeError, ValueError) as error:
-        raise ProblemError(name, expected, repr(values)) from error
-    if len(pose) not in (ndim, ndim + 1) or not np.isfinite(pose).all():
-        raise ProblemError(name, expected, repr(values))
-    return pose
+    return tuple(map(float, values))
 
 
 def _radius(name: str, value: float) -> float:
-    if not (is_number(value) and value >= 0):
-        raise ProblemError(name, "a radius of 0 or more [m]", repr(value))
+    if not (is_number(value) and 0 <= value <= LARGEST):
+        raise ProblemError(name, f"a radius from 0 to {LARGEST:g} [m]", repr(value))
     return float(value)

@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 
-from groundmap.arrays import Floats, Ints
+from groundmap.arrays import Floats, Ints, is_number
 from planners.answers import answer
 from planners.costmap import Costmap
 from planners.costs import MAX_NON_OBSTACLE
@@ -73,10 +73,11 @@ def shortcut(problem: PlanningProblem, route: Route, *, clearance: float | None 
     ([[2.0, 2.0], [30.0, 6.0]], 29.657, 28.284)
     """
     began = time.perf_counter()
-    if clearance is not None and not (math.isfinite(clearance) and clearance >= 0):
+    if clearance is not None and not (is_number(clearance) and clearance >= 0):
         raise ProblemError("clearance", "a distance of 0 or more [m]", repr(clearance))
     costmap = checked(problem, route)
-    line = tightened(costmap, route.waypoints, clearance=clearance)
+    kept = None if clearance is None else float(clearance)
+    line = tightened(costmap, route.waypoints, clearance=kept)
     saved = cost_of(costmap, route.waypoints) - cost_of(costmap, line)
     cost = length_of(line) if costmap.uniform else route.cost - saved
     found = Found(line, route.expanded, bound=route.bound, cost=cost)

@@ -12,7 +12,7 @@ import numpy as np
 from groundmap.arrays import Floats, as_floats, check_finite, is_number
 from planners.answers import answer
 from planners.costmap import Costmap
-from planners.engine import Clock, Found
+from planners.engine import Clock, Found, checked_limit
 from planners.errors import ProblemError, SmoothingError
 from planners.kernels.smooth import free_discs, relax
 from planners.polyline import length_of
@@ -101,13 +101,14 @@ def smooth(
     (True, True)
     """
     began = time.perf_counter()
+    limit = checked_limit(time_limit)
     costmap = checked(problem, route)
     goals = _goals(costmap, route, turning_radius, spacing)
     line = tightened(costmap, route.waypoints)
     if _is_straight(line, goals.yaws):
         found = Found(line, route.expanded)
     else:
-        line = _rounded(costmap, line, goals, Clock("smooth", time_limit))
+        line = _rounded(costmap, line, goals, Clock("smooth", limit))
         found = Found(line, route.expanded, headings=_headings(line, goals.yaws))
     grown = cost_of(costmap, line) - cost_of(costmap, route.waypoints)
     cost = None if costmap.uniform else route.cost + grown

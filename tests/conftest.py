@@ -26,6 +26,13 @@ hypothesis.settings.register_profile(
     print_blob=True,
     suppress_health_check=[hypothesis.HealthCheck.too_slow],
 )
+# New examples on every run, and more of them: what `make fuzz` looks for.
+hypothesis.settings.register_profile(
+    "explore",
+    hypothesis.settings.get_profile("ci"),
+    derandomize=False,
+    max_examples=500,
+)
 hypothesis.settings.load_profile("ci")
 
 

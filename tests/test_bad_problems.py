@@ -122,7 +122,7 @@ def test_a_footprint_larger_than_the_map_fits_nowhere(planner: str) -> None:
         ([(0, 0), (1, 1), (1, 0), (0, 1)], r"one that meets itself at \(0\.5, 0\.5\)"),
         ([(0, 0), (1, 0), (math.nan, 1)], "a number that is not finite"),
         ([(0, 0), (1, 0), (2, 0)], "points on one line"),
-        ([], r"shape \(0,\)"),
+        ([], "0 different points"),
         (-1.0, r"-1\.0"),
         (math.inf, "inf"),
         (None, r".*"),

@@ -203,5 +203,5 @@ def test_a_world_of_more_landmarks_than_memory_is_refused() -> None:
         World(bounds=(0, 0, 1e5, 6e4), ground_texture=12.0),
         World(bounds=(0, 0, 10, 10), solids=(box,)),
     ):
-        with pytest.raises(InputError, match=r"^world: expected 1e\+07 landmarks at most, got"):
+        with pytest.raises(InputError, match=r"^world: expected 1e\+06 landmarks at most, got"):
             strew(world, np.random.default_rng(1))

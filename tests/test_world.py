@@ -36,7 +36,7 @@ def world_of(*solids: Solid, holes: tuple[Hole, ...] = ()) -> World:
         ({"top": 1.0, "bottom": 1.0}, r"^top: expected a height above the bottom"),
         ({"top": 1.0, "bottom": 2.0}, r"^top: expected a height above the bottom"),
         ({"top": math.inf}, r"^top: expected a height above the bottom"),
-        ({"top": 1.0, "bottom": -math.inf}, r"^top: expected a height above the bottom"),
+        ({"top": 1.0, "bottom": -math.inf}, r"^bottom: expected a height below the top"),
         ({"top": math.nan}, r"^top: expected a height above the bottom"),
         ({"top": 1.0, "texture": -1.0}, r"^texture: expected a number of 0 or more, got -1.0"),
         ({"top": 1.0, "lines": math.nan}, r"^lines: expected a number of 0 or more"),

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from groundmap.arrays import as_floats, check_finite
 from groundmap.draw.figure import figure_png
+from groundmap.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 # Apart in greyscale, too: by marker and by dashes.
 STYLES = (("#1f5f8b", "o", "-"), ("#221122", "s", "-"), ("#d08030", "^", "--"))
 RECALL, FALSE = "truly free and in sight: free on the map", "free on the map: wrong by over 0.3 m"
+MOST_FEATURES = 1e12
 NEAREST = 0.13  # of a decade: ticks nearer than that to the one before have no room
 
 
@@ -33,12 +35,16 @@ def draw_curves(curves: Mapping[str, npt.ArrayLike], *, ax: Sequence[Axes]) -> l
     Raises
     ------
     InputError
-        Arrays of another shape, or numbers that are not finite.
+        Arrays of another shape, numbers of features below 1 or shares beyond [0, 1].
     """
     lines: list[Artist] = []
     values = {name: as_floats(name, rows, (3, None)) for name, rows in curves.items()}
     for number, (name, rows) in enumerate(values.items()):
         check_finite(name, rows)
+        if not ((rows[0] >= 1.0) & (rows[0] <= MOST_FEATURES)).all():
+            raise InputError(name, f"numbers of features from 1 to {MOST_FEATURES:g}", "others")
+        if not ((rows[1:] >= 0.0) & (rows[1:] <= 1.0)).all():
+            raise InputError(name, "shares from 0 to 1", "others")
         color, marker, dashes = STYLES[number % len(STYLES)]
         for axes, shares in zip(ax, rows[1:], strict=True):
             lines += axes.plot(

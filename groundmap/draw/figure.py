@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PICTURE_FORMATS = (".png", ".pdf", ".svg")
+SMALLEST_BOX, LARGEST_BOX = 1e-3, 1e12  # [m]
+FINEST = 1e-9  # least side of a box, as a share of its coordinates: axes can't label less
 LONG_SIDE = 11.0  # [inch]
 
 
@@ -45,6 +47,10 @@ def new_figure(bounds: npt.ArrayLike) -> tuple[Figure, Axes]:
     width, height = xmax - xmin, ymax - ymin
     if not (width > 0 and height > 0):
         raise InputError("bounds", "XMIN < XMAX and YMIN < YMAX [m]", str(box.tolist()))
+    largest = max(float(np.abs(box).max()), SMALLEST_BOX)
+    if min(width, height) < FINEST * largest or largest > LARGEST_BOX:
+        expected = f"a box within {LARGEST_BOX:g} m, of which coordinates tell the sides apart"
+        raise InputError("bounds", expected, str(box.tolist()))
     scale = LONG_SIDE / max(width, height)
     figure = Figure(
         figsize=(max(width * scale, 4.5) + 0.9, max(height * scale, 3.0) + 1.3),

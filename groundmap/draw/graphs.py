@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import as_floats
+from groundmap.arrays import as_floats, check_finite
 from groundmap.draw.figure import add_to_legend
 from groundmap.errors import InputError
 
@@ -47,12 +47,16 @@ def draw_graph(
     places = as_floats("vertices", vertices, (None, None))
     if places.shape[1] < 2 and len(places):
         raise InputError("vertices", "x and y", f"shape {places.shape}")
-    joined = as_floats("edges", edges, (None, 2)).astype(np.int64)
-    wrong = ((joined < 0) | (joined >= len(places))).any(axis=1)
+    check_finite("vertices", places)
+    indices = as_floats("edges", edges, (None, 2))
+    within = (indices >= 0) & (indices < len(places)) & (np.floor(indices) == indices)
+    wrong = ~within.all(axis=1)
     if wrong.any():
         first = int(wrong.argmax())
         expected = f"indices of {len(places)} vertices"
-        raise InputError("edges", expected, str(joined[first].tolist()), where=f"row {first}")
+        got = f"[{indices[first, 0]:g}, {indices[first, 1]:g}]"
+        raise InputError("edges", expected, got, where=f"row {first}")
+    joined = indices.astype(np.int64)
     segments: Any = places[joined][..., :2]
     many = len(joined) >= MANY
     lines = LineCollection(

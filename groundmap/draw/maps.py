@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import Floats, as_floats
+from groundmap.arrays import Floats, as_floats, as_number, check_finite
 from groundmap.draw.figure import add_to_legend, new_figure, scale_bar
 from groundmap.errors import InputError
 from groundmap.grid import ConfidenceGrid
@@ -84,6 +84,7 @@ def draw_grid(
     """
     from matplotlib.patches import Patch
 
+    epsilon = as_number("epsilon", epsilon, "a number above 0", above=0.0)
     box = known_bounds(grid) if bounds is None else as_floats("bounds", bounds, (4,))
     ax = ax or new_figure(box)[1]
     window = grid.window(box, most_cells=MOST_DRAWN)
@@ -113,7 +114,9 @@ def draw_trajectory(poses: npt.ArrayLike, *, ax: Axes) -> list[Artist]:
     poses : array_like, shape (n, 3)
         x, y [m, map] and yaw [rad].
     """
-    x, y, yaw = as_floats("poses", poses, (None, 3)).T
+    rows = as_floats("poses", poses, (None, 3))
+    check_finite("poses", rows)
+    x, y, yaw = rows.T
     if len(x) == 0:
         return []
     line = ax.plot(x, y, color=TRAJECTORY, linewidth=1.3, linestyle=(0, (5, 2)), zorder=3)[0]

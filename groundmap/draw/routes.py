@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from numbers import Real
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 import shapely
 
-from groundmap.arrays import Floats, as_floats
-from groundmap.draw.figure import add_to_legend
+from groundmap.arrays import Floats, as_floats, as_number, check_finite
+from groundmap.draw.figure import LARGEST_BOX, add_to_legend
+from groundmap.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.patches import Patch
 
 ROUTE, FOOTPRINT = "#c2185b", "#f06292"
+MOST_STAMPS = 1000
 STAMPS = 8.0  # [m] of route between two outlines of the footprint
 # Told apart by colour and by dash, however many there are and whoever looks.
 COLOURS = ("#c2185b", "#1565c0", "#ef6c00", "#2e7d32", "#6a1b9a", "#00838f", "#5d4037", "#37474f")
@@ -41,7 +44,7 @@ def draw_route(
     headings : array_like, shape (n,), optional [rad, map]
     ax : matplotlib Axes
     """
-    points = as_floats("waypoints", waypoints, (None, 2))
+    points = _points("waypoints", waypoints)
     artists: list[Artist] = []
     for patch in _footprints(points, footprint, headings):
         artists.append(ax.add_patch(patch))
@@ -64,7 +67,7 @@ def draw_routes(routes: Mapping[str, npt.ArrayLike], *, ax: Axes) -> list[Artist
     """
     lines: list[tuple[list[str], Floats]] = []
     for name, waypoints in routes.items():
-        points = as_floats("waypoints", waypoints, (None, 2))
+        points = _points(f"waypoints of {name}", waypoints)
         same = next((names for names, line in lines if np.array_equal(line, points)), None)
         if same is None:
             lines.append(([name], points))
@@ -97,16 +100,18 @@ def _footprints(
     from matplotlib.patches import Circle, Polygon
 
     outlines: list[Patch] = []
-    if np.ndim(footprint) == 0:
-        radius, line = float(np.asarray(footprint)), _line(points)
+    if isinstance(footprint, Real) or (isinstance(footprint, np.ndarray) and footprint.ndim == 0):
+        expected = "a radius of 0 or more [m], or corners x, y [m, base_link]"
+        given = footprint.item() if isinstance(footprint, np.ndarray) else footprint
+        radius, line = as_number("footprint", given, expected, least=0.0), _line(points)
         if radius == 0:
             return []
-        along = np.linspace(0.0, line.length, max(2, int(line.length / STAMPS) + 1))
+        along = np.linspace(0.0, line.length, _stamps(line.length))
         for centre in shapely.get_coordinates(shapely.line_interpolate_point(line, along)):
             outlines.append(Circle(centre.tolist(), radius, fill=False, zorder=4))
         swept = line.buffer(radius)
     else:
-        corners = as_floats("footprint", footprint, (None, 2))
+        corners = _points("footprint", footprint, least=3)
         placed = _placed(corners, points, headings)
         outlines = [Polygon(placed[k], fill=False, zorder=4) for k in _stamped(points)]
         swept = shapely.union_all(shapely.polygons(placed))
@@ -122,7 +127,10 @@ def _footprints(
 
 def _placed(corners: Floats, points: Floats, headings: npt.ArrayLike | None) -> Floats:
     """Return the corners at every waypoint, shape (n, m, 2) [m, map]."""
-    turns = as_floats("headings", np.zeros(len(points)) if headings is None else headings, (None,))
+    turns = np.zeros(len(points))
+    if headings is not None:
+        turns = as_floats("headings", headings, (len(points),))
+        check_finite("headings", turns)
     cos, sin = np.cos(turns)[:, None], np.sin(turns)[:, None]
     x, y = corners.T
     return np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1) + points[:, None]
@@ -131,8 +139,25 @@ def _placed(corners: Floats, points: Floats, headings: npt.ArrayLike | None) -> 
 def _stamped(points: Floats) -> list[int]:
     """Return the waypoints at which an outline is drawn."""
     along = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
-    wanted = np.linspace(0.0, along[-1], max(2, int(along[-1] / STAMPS) + 1))
+    wanted = np.linspace(0.0, along[-1], _stamps(float(along[-1])))
     return [int(k) for k in np.unique(np.searchsorted(along, wanted).clip(max=len(points) - 1))]
+
+
+def _stamps(length: float) -> int:
+    """Return how many outlines of the footprint are drawn along a route of that length [m]."""
+    return 2 if length < STAMPS else min(int(length / STAMPS) + 1, MOST_STAMPS)
+
+
+def _points(name: str, values: npt.ArrayLike, *, least: int = 1) -> Floats:
+    """Return points, shape (n, 2) [m]: at least so many, all finite and no farther than a map."""
+    points = as_floats(name, values, (None, 2))
+    check_finite(name, points)
+    if len(points) < least:
+        raise InputError(name, f"{least} or more points x, y [m]", str(len(points)))
+    farthest = float(np.abs(points).max())
+    if farthest > LARGEST_BOX:
+        raise InputError(name, f"points within {LARGEST_BOX:g} m", f"{farthest:g} m")
+    return points
 
 
 def _line(points: Floats) -> shapely.LineString:

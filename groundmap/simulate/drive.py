@@ -11,8 +11,9 @@ from pydantic import Field
 from groundmap.arrays import Floats, as_floats, check_finite
 from groundmap.errors import InputError
 from groundmap.settings import Settings
+from groundmap.simulate.world import FARTHEST
 
-MOST_VIEWS = 100_000
+MOST_VIEWS = 100_000  # of a drive: more is a distance in the wrong unit
 
 
 class DriveSettings(Settings):
@@ -42,6 +43,11 @@ class Drive(NamedTuple):
 
 def drive(settings: DriveSettings, rng: np.random.Generator) -> Drive:
     """Return the poses of a drive from stop to stop, straight and at a steady pace.
+
+    Raises
+    ------
+    InputError
+        A stop that is not finite or more than 1e8 m off, or more than 100,000 views.
 
     Examples
     --------
@@ -73,24 +79,28 @@ def _along(settings: DriveSettings) -> Floats:
     """Return x, y [m] and yaw [rad] of each view."""
     stops = as_floats("stops", settings.stops, (None, 3))
     check_finite("stops", stops)
+    farthest = np.abs(stops[:, :2]).max()
+    if farthest > FARTHEST:
+        raise InputError("stops", f"places within {FARTHEST:g} m of the origin", f"{farthest:g} m")
     stops = np.column_stack([stops[:, :2], np.unwrap(np.radians(stops[:, 2]))])
     moves = np.diff(stops, axis=0)
-    lengths = np.hypot(moves[:, 0], moves[:, 1]) / settings.every
-    turns = np.abs(moves[:, 2]) / settings.every_turn
-    steps_needed = np.maximum(np.ceil(np.maximum(lengths, turns)), 1.0)
-    if steps_needed.sum() > MOST_VIEWS:
+    with np.errstate(over="ignore"):  # what is too far is refused below
+        lengths = np.hypot(moves[:, 0], moves[:, 1]) / settings.every
+        turns = np.abs(moves[:, 2]) / settings.every_turn
+    steps = np.maximum(np.ceil(np.maximum(lengths, turns)), 1.0)
+    if not steps.sum() <= MOST_VIEWS:
         raise InputError(
             "stops",
-            f"a drive of {MOST_VIEWS} views at most",
-            f"{steps_needed.sum():.3g}",
+            f"a drive of {MOST_VIEWS:g} views at most",
+            f"{steps.sum():.3g}",
             hint="Take stops nearer to each other, or larger every [m] and every_turn [rad].",
         )
-    counts = steps_needed.astype(int)
-    steps = [
+    counts = steps.astype(np.int64)
+    poses = [
         stop + np.outer(np.arange(count) / count, move)
         for stop, count, move in zip(stops[:-1], counts, moves, strict=True)
     ]
-    return np.concatenate([*steps, stops[-1:]])
+    return np.concatenate([*poses, stops[-1:]])
 
 
 def _drifted(poses: Floats, settings: DriveSettings) -> Floats:

@@ -15,7 +15,7 @@ from groundmap.simulate.world import Hole, Solid, World
 
 GROUND = -1  # the owner of what belongs to no solid
 OFF = 1e-6  # [m], landmarks stand off their surface, so that it doesn't hide them
-MOST = 1e7  # landmarks of a world: more is a size or a density in the wrong unit
+MOST = 1e6  # landmarks of a world: more is a size or a density in the wrong unit
 SHORTEST, LONGEST = 0.3, 1.2  # [m], of a segment
 
 
@@ -63,7 +63,7 @@ def strew(world: World, rng: np.random.Generator) -> Landmarks:
     Raises
     ------
     InputError
-        More than ten million landmarks.
+        More than a million landmarks.
 
     Examples
     --------

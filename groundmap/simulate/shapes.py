@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from groundmap.arrays import as_floats, check_finite
+from groundmap.arrays import as_floats, as_number, check_finite
 from groundmap.errors import InputError
-from groundmap.simulate.world import Solid
+from groundmap.simulate.world import FARTHEST, Solid
 
 POLE_SIDES = 12
 LEG, SLAB = 0.06, 0.05  # [m], of a table
@@ -24,6 +24,8 @@ def box(x0: float, y0: float, x1: float, y1: float) -> shapely.Polygon:
     InputError
         Corners that do not differ in both coordinates.
     """
+    corners = (as_number("box", value, "two opposite corners [m]") for value in (x0, y0, x1, y1))
+    x0, y0, x1, y1 = corners
     if x0 == x1 or y0 == y1:
         raise InputError("box", "two opposite corners [m]", f"{(x0, y0, x1, y1)}")
     return shapely.box(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
@@ -54,8 +56,14 @@ def wall(points: npt.ArrayLike, *, thickness: float = 0.2) -> shapely.Polygon:
     """
     corners = as_floats("wall", points, (None, 2))
     check_finite("wall", corners)
+    farthest = np.abs(corners).max(initial=0.0)
+    if farthest > FARTHEST:
+        raise InputError("wall", f"corners within {FARTHEST:g} m", f"{farthest:g} m")
     if len(corners) < 2:
         raise InputError("wall", "two corners or more [m]", str(len(corners)))
+    thickness = as_number("thickness", thickness, f"a number up to {FARTHEST:g} [m]")
+    if thickness > FARTHEST:
+        raise InputError("thickness", f"a number up to {FARTHEST:g} [m]", f"{thickness:g}")
     line = shapely.LineString(corners)
     outline: shapely.Polygon = line.buffer(
         thickness / 2.0, cap_style="flat", join_style="mitre", single_sided=False
@@ -65,6 +73,8 @@ def wall(points: npt.ArrayLike, *, thickness: float = 0.2) -> shapely.Polygon:
 
 def pole(x: float, y: float, *, radius: float = 0.06) -> shapely.Polygon:
     """Return a regular polygon of twelve corners around a place [m]; `radius` is to its corners."""
+    x, y = as_number("x", x, "a number [m]"), as_number("y", y, "a number [m]")
+    radius = as_number("radius", radius, "a number [m]")
     turns = 2.0 * np.pi * np.arange(POLE_SIDES) / POLE_SIDES
     return shapely.Polygon(
         np.column_stack([x + radius * np.cos(turns), y + radius * np.sin(turns)])
@@ -84,6 +94,7 @@ def table(
     **options
         Other parameters of the solids, such as ``texture``.
     """
+    height = as_number("height", height, "a number [m]")
     top = box(x0, y0, x1, y1)
     xmin, ymin, xmax, ymax = top.bounds
     inset = 0.15 + LEG / 2.0

@@ -9,9 +9,11 @@ import numpy as np
 import shapely
 from shapely.affinity import translate
 
-from groundmap.arrays import as_floats
+from groundmap.arrays import as_floats, as_number, check_finite
 from groundmap.errors import InputError
 
+FARTHEST = 1e8  # [m] of an outline from the origin: beyond, edges of centimetres have no length
+THINNEST = 1e-9  # [m] between two sides: less is rounding, and faces would have no direction
 ALWAYS = (-math.inf, math.inf)
 
 
@@ -69,16 +71,22 @@ class Solid:
     def __post_init__(self) -> None:
         """Check what a prism needs; the outline's exterior is turned counter-clockwise."""
         object.__setattr__(self, "outline", _polygon("outline", self.outline))
-        if not (math.isfinite(self.top) and math.isfinite(self.bottom) and self.bottom < self.top):
-            raise InputError("top", "a height above the bottom [m]", f"{self.bottom} to {self.top}")
+        bottom = as_number("bottom", self.bottom, "a height below the top [m]")
+        top = as_number("top", self.top, "a height above the bottom [m]")
+        if top - bottom < THINNEST:
+            raise InputError("top", "a height above the bottom [m]", f"{bottom} to {top}")
+        object.__setattr__(self, "bottom", bottom)
+        object.__setattr__(self, "top", top)
         for name in ("texture", "lines", "repeat"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0):
-                raise InputError(name, "a number of 0 or more", str(value))
-        if not np.isfinite(self.velocity).all():
-            raise InputError("velocity", "finite numbers [m/s]", str(self.velocity))
-        if not self.present[0] < self.present[1]:
-            raise InputError("present", "(from, until) [s]", str(self.present))
+            value = as_number(name, getattr(self, name), "a number of 0 or more", least=0.0)
+            object.__setattr__(self, name, value)
+        velocity = as_floats("velocity", self.velocity, (2,))
+        check_finite("velocity", velocity)
+        object.__setattr__(self, "velocity", tuple(velocity.tolist()))
+        since, until = as_floats("present", self.present, (2,)).tolist()
+        if not since < until:
+            raise InputError("present", "(from, until) [s]", f"{since} to {until}")
+        object.__setattr__(self, "present", (since, until))
 
     def is_there(self, time: float) -> bool:
         """Return whether it is there at a time [s]."""
@@ -119,8 +127,8 @@ class Hole:
     def __post_init__(self) -> None:
         """Check the outline and the depth."""
         object.__setattr__(self, "outline", _polygon("outline", self.outline))
-        if not (math.isfinite(self.depth) and self.depth > 0):
-            raise InputError("depth", "a number above 0 [m]", str(self.depth))
+        depth = as_number("depth", self.depth, "a number above 0 [m]", above=0.0)
+        object.__setattr__(self, "depth", depth)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -161,13 +169,14 @@ class World:
 
     def __post_init__(self) -> None:
         """Check the bounds and the densities."""
-        xmin, ymin, xmax, ymax = as_floats("bounds", self.bounds, (4,))
-        if not (np.isfinite(self.bounds).all() and xmin < xmax and ymin < ymax):
-            raise InputError("bounds", "XMIN < XMAX and YMIN < YMAX [m]", str(self.bounds))
+        bounds = as_floats("bounds", self.bounds, (4,))
+        xmin, ymin, xmax, ymax = bounds.tolist()
+        if not (np.isfinite(bounds).all() and xmin < xmax and ymin < ymax):
+            raise InputError("bounds", "XMIN < XMAX and YMIN < YMAX [m]", str(bounds.tolist()))
+        object.__setattr__(self, "bounds", (xmin, ymin, xmax, ymax))
         for name in ("ground_texture", "ground_lines"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0):
-                raise InputError(name, "a number of 0 or more [1/m²]", str(value))
+            value = as_number(name, getattr(self, name), "a number of 0 or more [1/m²]", least=0.0)
+            object.__setattr__(self, name, value)
 
     def at(self, time: float) -> World:
         """Return the world as it stands at a time [s]: what is there, where it is then."""
@@ -201,8 +210,11 @@ class World:
 
 def _polygon(name: str, outline: shapely.Polygon) -> shapely.Polygon:
     if not isinstance(outline, shapely.Polygon):
-        raise InputError(name, "a shapely.Polygon", repr(outline))
-    if not outline.is_valid or outline.area <= 0:
+        raise InputError(name, "a shapely.Polygon", repr(outline)[:60])
+    farthest = np.abs(outline.bounds).max()
+    if farthest > FARTHEST:
+        raise InputError(name, f"a polygon within {FARTHEST:g} m of the origin", f"{farthest:g} m")
+    if not outline.is_valid or outline.area <= THINNEST**2:
         fault = "one without" if outline.is_valid else shapely.is_valid_reason(outline)
         raise InputError(name, "a polygon with an area [m, map]", fault)
     return shapely.orient_polygons(outline)

@@ -1,0 +1,177 @@
+"""Values that no caller should give are refused by name, wherever the public API takes values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from groundmap import ConfidenceGrid, GroundPlane, GroundSettings, MapperSettings, StereoRig, View
+from groundmap.arrays import as_number, is_number
+from groundmap.draw import draw_curves, draw_graph, draw_route, draw_trajectory, new_figure
+from groundmap.errors import CameraError, InputError, SettingsError
+from groundmap.ground_fit import fit_ground
+from groundmap.simulate import DriveSettings, Solid, World, drive
+from groundmap.simulate.shapes import box, pole, wall
+from planners import Footprint, PlanningProblem, distance_field, plan, plan_many, shortcut, smooth
+from planners.errors import ProblemError
+
+RIG = {"fx": 700.0, "fy": 700.0, "cx": 320.0, "cy": 240.0, "baseline": 0.5}
+NO_NUMBERS = (
+    "1", None, True, 1j, np.complex128(1), Decimal("NaN"), Fraction(10**400), 10**400,
+    np.timedelta64(1, "s"), np.array([1.0, 2.0]), [1.0], float("nan"), float("-inf"),
+)  # fmt: skip
+
+
+def problem(**options: Any) -> PlanningProblem:
+    grid = ConfidenceGrid(resolution=0.5)
+    grid.fuse(np.array([0, 0]), np.full((24, 24), -1.0, dtype=np.float32))
+    given = {"start": (2, 2), "goal": (9, 6), "footprint": 0.4} | options
+    return PlanningProblem(grid, **given)
+
+
+@pytest.mark.parametrize("value", NO_NUMBERS, ids=lambda value: f"{value!r:.20}")
+def test_what_is_no_finite_number_is_refused_by_name(value: Any) -> None:
+    assert not is_number(value)
+    with pytest.raises(InputError, match=r"^depth: expected a number, got"):
+        as_number("depth", value, "a number")
+
+
+@pytest.mark.parametrize("value", [2, 2.0, np.float32(2), np.int8(2), Fraction(2)])
+def test_numbers_of_any_type_are_floats(value: Any) -> None:
+    assert as_number("depth", value, "a number", least=2.0) == 2.0
+    with pytest.raises(InputError, match=r"^depth: expected more, got"):
+        as_number("depth", value, "more", above=2.0)
+
+
+@pytest.mark.parametrize("value", NO_NUMBERS, ids=lambda value: f"{value!r:.20}")
+@pytest.mark.parametrize(
+    ("call", "match"),
+    [
+        (lambda value: StereoRig(**RIG | {"fx": value}), "^fx: expected a number above 0"),
+        (lambda value: StereoRig(**RIG | {"cx": value}), "^cx, cy: expected finite numbers"),
+        (lambda value: GroundPlane(normal=(0, 0, 1), offset=value), "^plane: expected a finite"),
+        (lambda value: pole(value, 1.0), "^x: expected a number"),
+        (lambda value: box(value, 1.0, 2.0, 2.0), "^box: expected"),
+        (lambda value: Solid(box(0, 0, 1, 1), top=value), "^top: expected a height"),
+        (lambda value: World(bounds=(0, 0, 1, 1), ground_lines=value), "^ground_lines: expected"),
+        (lambda value: problem(clear_start_radius=[value]), "^clear_start_radius: expected"),
+        (lambda value: problem(start=(value, 2)), "^start: expected x, y"),
+        (lambda value: Footprint.of([(0, 0), (1, 0), (0, value)]), "^footprint: expected"),
+        (lambda value: distance_field(problem(), (2, value)), "^source: expected x, y"),
+    ],
+)
+def test_every_value_is_checked_where_it_is_given(
+    call: Callable[[Any], object], match: str, value: Any
+) -> None:
+    if isinstance(value, str | bool) and match == "^footprint: expected":
+        return  # arrays take numbers as strings, and truth values as 0 and 1, as NumPy does
+    with pytest.raises((InputError, ProblemError), match=match):
+        call(value)
+
+
+def test_ragged_pixels_and_huge_ids_are_refused() -> None:
+    rig = StereoRig(**RIG)
+    with pytest.raises(InputError, match=r"^pixels: expected numbers of shape"):
+        rig.triangulate([[1.0, 2.0, 3.0], [1.0]])
+    with pytest.raises(InputError, match=r"^point_ids: expected whole numbers"):
+        View.from_pixels(np.eye(4), rig, points_px=[(9, 8, 1)], point_ids=[[1], [2, 3]])
+    with pytest.raises(InputError, match=r"^point_ids: expected whole numbers within 64 bits"):
+        View.from_pixels(
+            np.eye(4), rig, points_px=[(9, 8, 1)], point_ids=np.array([2**64 - 1], np.uint64)
+        )
+
+
+def test_a_pose_of_huge_entries_is_no_rotation() -> None:
+    with pytest.raises(CameraError, match="orthonormal rows"):
+        StereoRig(**RIG, T_base_camera=np.full((4, 4), 1e300))
+
+
+def test_a_camera_height_is_checked_before_the_first_view() -> None:
+    with pytest.raises(InputError, match=r"^camera_height: expected a number above 0"):
+        fit_ground([], camera_height=np.array([1.0, 2.0]))
+
+
+def test_settings_that_no_computation_can_hold_are_refused() -> None:
+    with pytest.raises(SettingsError, match=r"^support_width: expected a number within 1e\+09"):
+        MapperSettings(support_width=1e300)
+    with pytest.raises(SettingsError, match=r"^window: expected less than or equal to 10000"):
+        GroundSettings(window=2**62)
+
+
+@pytest.mark.parametrize(
+    ("stops", "match"),
+    [
+        ([(0, 0, 0), (9e7, 0, 0)], "a drive of 100000 views at most, got 9e"),
+        ([(0, 0, 0), (1e300, 0, 0)], r"places within 1e\+08 m of the origin"),
+    ],
+)
+def test_a_drive_that_takes_gigabytes_is_refused(stops: Any, match: str) -> None:
+    with pytest.raises(InputError, match=f"^stops: expected {match}"):
+        drive(DriveSettings(stops=stops), np.random.default_rng(1))
+
+
+def test_a_wall_beyond_every_map_is_refused() -> None:
+    with pytest.raises(InputError, match=r"^wall: expected corners within 1e\+08 m"):
+        wall([(0, 0), (1e300, 0)])
+    with pytest.raises(InputError, match=r"^thickness: expected a number up to"):
+        wall([(0, 0), (1, 0)], thickness=1e155)
+
+
+@pytest.mark.parametrize("value", [1e7, np.array(-1.0), [(0, 0), (1e9, 0), (0, 1)], 1e300])
+def test_footprints_are_within_a_thousand_kilometres(value: Any) -> None:
+    with pytest.raises(ProblemError, match=r"^footprint: expected a radius"):
+        Footprint.of(value)
+
+
+@pytest.mark.parametrize(
+    ("call", "match"),
+    [
+        (lambda ax: new_figure((0, 0, 1e300, 1e-300)), "^bounds: expected a box within"),
+        (lambda ax: draw_route([(0, 0), (np.nan, 1)], footprint=1.0, ax=ax), "^waypoints: "),
+        (lambda ax: draw_route([], footprint=1.0, ax=ax), "^waypoints: expected 1 or more points"),
+        (lambda ax: draw_route([(0, 0)], footprint=-1.0, ax=ax), "^footprint: expected a radius"),
+        (lambda ax: draw_route([(0, 0)], footprint=[(0, 0)], ax=ax), "^footprint: expected 3 or"),
+        (
+            lambda ax: draw_route(
+                [(0, 0)], footprint=[(0, 0), (1, 0), (0, 1)], headings=[0, 1], ax=ax
+            ),
+            r"^headings: expected shape \(1,\)",
+        ),
+        (lambda ax: draw_graph([(0, 0)], [(0, 0.5)], ax=ax), "^edges: expected indices"),
+        (lambda ax: draw_trajectory([(0, 0, np.inf)], ax=ax), "^poses: expected finite"),
+        (lambda ax: draw_curves({"a": [[0], [0], [0]]}, ax=[ax, ax]), "^a: expected numbers of"),
+        (lambda ax: draw_curves({"a": [[9], [2], [0]]}, ax=[ax, ax]), "^a: expected shares from"),
+    ],
+)
+def test_pictures_of_what_can_not_be_drawn_are_refused(
+    call: Callable[[Any], object], match: str
+) -> None:
+    with pytest.raises(InputError, match=match):
+        call(Figure().subplots())
+
+
+@pytest.mark.parametrize("limit", ["1", -1.0, float("nan"), [1], 10**400])
+def test_time_limits_are_numbers_or_none(limit: Any) -> None:
+    posed = problem()
+    with pytest.raises(ProblemError, match=r"^time_limit: expected a number of 0 or more"):
+        distance_field(posed, (2, 2), time_limit=limit)
+    with pytest.raises(ProblemError, match=r"^time_limit: expected a number of 0 or more"):
+        smooth(posed, plan(posed), turning_radius=1.0, time_limit=limit)
+
+
+def test_options_of_queries_are_checked() -> None:
+    posed = problem()
+    pairs: Any = 1
+    with pytest.raises(ProblemError, match=r"^pairs: expected pairs of a start and a goal"):
+        plan_many(posed, pairs)
+    with pytest.raises(ProblemError, match=r"^unknown: expected 'avoid', 'allow' or 'penalise'"):
+        problem(unknown=np.array(["avoid", "allow"]))
+    with pytest.raises(ProblemError, match=r"^clearance: expected a distance of 0 or more"):
+        shortcut(posed, plan(posed), clearance=Fraction(10**400))  # type: ignore[arg-type]  # odd
+    assert shortcut(posed, plan(posed), clearance=np.longdouble(1.0)).audit == "clean"
