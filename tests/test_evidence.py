@@ -314,7 +314,7 @@ def test_nothing_seen_says_nothing() -> None:
 def test_the_resolution_is_refused_if_a_view_takes_too_many_cells() -> None:
     flat = flat_view([(9, -9), (9, 9)], [(0, 1)])
     with pytest.raises(InputError, match=r"resolution: expected one that cuts a view into"):
-        by_hand(flat, resolution=1e-4)
+        by_hand(flat, resolution=1e-3)
 
 
 def test_drop_offs_are_counted_once_per_cell() -> None:

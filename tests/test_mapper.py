@@ -217,7 +217,7 @@ def test_a_refused_view_leaves_grid_and_figures_as_they_were(
 
 
 def test_a_resolution_in_the_wrong_unit_is_refused_before_memory_runs_out() -> None:
-    mapper = GroundMapper(resolution=1e-4)
+    mapper = GroundMapper(resolution=1e-3)
     before = snapshot(mapper)
     with pytest.raises(
         InputError, match=r"^resolution: expected one that cuts a view into \d+ cel"
