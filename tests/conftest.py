@@ -15,7 +15,7 @@ import planners
 from planners.engine import Clock, SearchSettings
 
 DEFAULT_LIMIT = SearchSettings().time_limit
-TICK = 1e-3  # [s] that pass at each look at the clock of `ticking`
+TICK = 1e-4  # [s] that pass at each look at the clock of `ticking`
 PACKAGES = (groundmap, planners)
 
 # The same examples every time, and no clock: kernels compile during some first example.
