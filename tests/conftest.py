@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sysconfig
 from itertools import count
 from pathlib import Path
@@ -53,6 +54,7 @@ def ticking(monkeypatch: pytest.MonkeyPatch) -> None:
     looks = count()
     for module in ("engine", "solve", "registry"):
         monkeypatch.setattr(f"planners.{module}.now", lambda: TICK * next(looks))
+    monkeypatch.setattr("planners.sampling.states.SOON", math.inf)  # looks by calls, not by time
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
