@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sysconfig
 from itertools import count
 from pathlib import Path
@@ -15,7 +16,7 @@ import planners
 from planners.engine import Clock, SearchSettings
 
 DEFAULT_LIMIT = SearchSettings().time_limit
-TICK = 1e-3  # [s] that pass at each look at the clock of `ticking`
+TICK = 1e-4  # [s] that pass at each look at the clock of `ticking`
 PACKAGES = (groundmap, planners)
 
 # The same examples every time, and no clock: kernels compile during some first example.
@@ -53,6 +54,7 @@ def ticking(monkeypatch: pytest.MonkeyPatch) -> None:
     looks = count()
     for module in ("engine", "solve", "registry"):
         monkeypatch.setattr(f"planners.{module}.now", lambda: TICK * next(looks))
+    monkeypatch.setattr("planners.sampling.states.SOON", math.inf)  # looks by calls, not by time
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import _thread
 import copy
 import gc
 import math
 import pickle
+import signal
 import threading
 from pathlib import Path
 from typing import Any
@@ -251,7 +251,10 @@ def test_the_threads_of_many_plans_wait_without_loss() -> None:
 
 
 def test_ctrl_c_ends_many_plans() -> None:
-    timer = threading.Timer(0.5, _thread.interrupt_main)
+    # The signal itself: `interrupt_main` would not wake a main thread that waits for others.
+    main = threading.main_thread().ident
+    assert main is not None
+    timer = threading.Timer(0.5, signal.pthread_kill, (main, signal.SIGINT))
     timer.start()
     with pytest.raises(KeyboardInterrupt, match=r"^$"):
         plan_many(needle(), [((2, 2), (9.5, 10))] * 4, "rrtconnect", time_limit=None)

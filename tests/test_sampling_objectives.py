@@ -449,7 +449,7 @@ field[8:16, 4:16] = 1.0
 field[rng.random((24, 24)) < 0.05] = -0.3
 grid.fuse(np.array([0, 0]), field)
 costs = CostSettings(clearance_weight=10.0, inflation_radius=0.0, confidence_weight=10.0)
-ends = {"start": (0.1236, 0.0384), "goal": (0.1404, 0.2412)}
+ends = {"start": 0.012 * np.array([10.3, 3.2]), "goal": 0.012 * np.array([11.7, 20.1])}
 problem = PlanningProblem(grid, **ends, footprint=0.0, costs=costs)
 print(plan(problem, "bitstar", time_limit=None, iterations=3000, seed=7).audit)
 """
