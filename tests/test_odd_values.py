@@ -31,7 +31,7 @@ NO_NUMBERS = (
 def problem(**options: Any) -> PlanningProblem:
     grid = ConfidenceGrid(resolution=0.5)
     grid.fuse(np.array([0, 0]), np.full((24, 24), -1.0, dtype=np.float32))
-    given = {"start": (2, 2), "goal": (9, 6), "footprint": 0.4} | options
+    given: dict[str, Any] = {"start": (2, 2), "goal": (9, 6), "footprint": 0.4} | options
     return PlanningProblem(grid, **given)
 
 
@@ -55,7 +55,10 @@ def test_numbers_of_any_type_are_floats(value: Any) -> None:
     [
         (lambda value: StereoRig(**RIG | {"fx": value}), "^fx: expected a number above 0"),
         (lambda value: StereoRig(**RIG | {"cx": value}), "^cx, cy: expected finite numbers"),
-        (lambda value: GroundPlane(normal=(0, 0, 1), offset=value), "^plane: expected a finite"),
+        (
+            lambda value: GroundPlane(normal=np.array([0.0, 0.0, 1.0]), offset=value),
+            "^plane: expected a finite",
+        ),
         (lambda value: pole(value, 1.0), "^x: expected a number"),
         (lambda value: box(value, 1.0, 2.0, 2.0), "^box: expected"),
         (lambda value: Solid(box(0, 0, 1, 1), top=value), "^top: expected a height"),
