@@ -21,7 +21,7 @@ from groundmap.simulate.shapes import box, pole, wall
 from planners import Footprint, PlanningProblem, distance_field, plan, plan_many, shortcut, smooth
 from planners.errors import ProblemError
 
-RIG = {"fx": 700.0, "fy": 700.0, "cx": 320.0, "cy": 240.0, "baseline": 0.5}
+RIG: dict[str, Any] = {"fx": 700.0, "fy": 700.0, "cx": 320.0, "cy": 240.0, "baseline": 0.5}
 NO_NUMBERS = (
     "1", None, True, 1j, np.complex128(1), Decimal("NaN"), Fraction(10**400), 10**400,
     np.timedelta64(1, "s"), np.array([1.0, 2.0]), [1.0], float("nan"), float("-inf"),
@@ -31,7 +31,7 @@ NO_NUMBERS = (
 def problem(**options: Any) -> PlanningProblem:
     grid = ConfidenceGrid(resolution=0.5)
     grid.fuse(np.array([0, 0]), np.full((24, 24), -1.0, dtype=np.float32))
-    given = {"start": (2, 2), "goal": (9, 6), "footprint": 0.4} | options
+    given: dict[str, Any] = {"start": (2, 2), "goal": (9, 6), "footprint": 0.4} | options
     return PlanningProblem(grid, **given)
 
 
@@ -55,7 +55,10 @@ def test_numbers_of_any_type_are_floats(value: Any) -> None:
     [
         (lambda value: StereoRig(**RIG | {"fx": value}), "^fx: expected a number above 0"),
         (lambda value: StereoRig(**RIG | {"cx": value}), "^cx, cy: expected finite numbers"),
-        (lambda value: GroundPlane(normal=(0, 0, 1), offset=value), "^plane: expected a finite"),
+        (
+            lambda value: GroundPlane(normal=np.array([0.0, 0.0, 1.0]), offset=value),
+            "^plane: expected a finite",
+        ),
         (lambda value: pole(value, 1.0), "^x: expected a number"),
         (lambda value: box(value, 1.0, 2.0, 2.0), "^box: expected"),
         (lambda value: Solid(box(0, 0, 1, 1), top=value), "^top: expected a height"),
@@ -93,8 +96,9 @@ def test_a_pose_of_huge_entries_is_no_rotation() -> None:
 
 
 def test_a_camera_height_is_checked_before_the_first_view() -> None:
+    heights: Any = np.array([1.0, 2.0])
     with pytest.raises(InputError, match=r"^camera_height: expected a number above 0"):
-        fit_ground([], camera_height=np.array([1.0, 2.0]))
+        fit_ground([], camera_height=heights)
 
 
 def test_settings_that_no_computation_can_hold_are_refused() -> None:
@@ -168,10 +172,12 @@ def test_time_limits_are_numbers_or_none(limit: Any) -> None:
 def test_options_of_queries_are_checked() -> None:
     posed = problem()
     pairs: Any = 1
+    huge: Any = Fraction(10**400)
+    long: Any = np.longdouble(1.0)
     with pytest.raises(ProblemError, match=r"^pairs: expected pairs of a start and a goal"):
         plan_many(posed, pairs)
     with pytest.raises(ProblemError, match=r"^unknown: expected 'avoid', 'allow' or 'penalise'"):
         problem(unknown=np.array(["avoid", "allow"]))
     with pytest.raises(ProblemError, match=r"^clearance: expected a distance of 0 or more"):
-        shortcut(posed, plan(posed), clearance=Fraction(10**400))  # type: ignore[arg-type]  # odd
-    assert shortcut(posed, plan(posed), clearance=np.longdouble(1.0)).audit == "clean"
+        shortcut(posed, plan(posed), clearance=huge)
+    assert shortcut(posed, plan(posed), clearance=long).audit == "clean"

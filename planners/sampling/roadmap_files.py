@@ -86,7 +86,18 @@ def read_roadmap(
             "one that was grown over other free cells or for another footprint",
             hint="Grow another one.",
         )
+    if not _is_on_map(graph, costmap):
+        raise FileFormatError(path, "a whole roadmap", "places that are not on the map")
     return graph, costmap, settings
+
+
+def _is_on_map(graph: Graph, costmap: Costmap) -> bool:
+    """Whether all places of a roadmap lie within the costmap, or on its border."""
+    window = costmap.window
+    lower = window.origin
+    upper = lower + np.array(costmap.blocked.shape[::-1]) * window.resolution
+    places = graph.vertices[:, :2]
+    return bool(((places >= lower) & (places <= upper)).all())
 
 
 def _costmap_of(problem: PlanningProblem) -> Costmap | None:
@@ -108,7 +119,7 @@ def _fits(graph: Graph, *, width: int) -> bool:
         and vertices.dtype == weights.dtype == np.float64
         and edges.dtype == np.int64
         and bool(np.isfinite(vertices).all())
-        and bool((weights >= 0.0).all())
+        and bool((np.isfinite(weights) & (weights >= 0.0)).all())
         and bool(((edges >= 0) & (edges < len(vertices))).all())
     )
 

@@ -42,10 +42,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             workers=options.workers,
             limits=limits,
         )
-        end = time.monotonic() + options.seconds
         try:
             jobs = _jobs(files, options.files, calls, options.calls, options.seed)
-            for report in pool.run(_until(jobs, end)):
+            for report in pool.run(_until(jobs, options.seconds)):
                 summary.add(report)
         finally:
             pool.close()
@@ -105,7 +104,9 @@ def _shared(targets: Sequence[Target], cases: int) -> Iterator[Job]:
             yield Job(target.name, list(range(first, min(first + BATCH, count))))
 
 
-def _until(jobs: Iterator[Job], end: float) -> Iterator[Job]:
+def _until(jobs: Iterator[Job], seconds: float) -> Iterator[Job]:
+    """Yield jobs as long as the time lasts, which begins when a worker first asks for one."""
+    end = time.monotonic() + seconds
     for job in jobs:
         if time.monotonic() > end:
             return
