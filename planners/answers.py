@@ -10,13 +10,14 @@ from itertools import product
 import numpy as np
 from scipy import ndimage
 
-from groundmap.arrays import Bools, Floats
+from groundmap.arrays import Bools, Floats, Ints
 from planners.audit import audit
 from planners.audit3d import audit3d
 from planners.costmap import Costmap
 from planners.engine import Found, Pose
 from planners.errors import NonFreeError, OutsideMapError, ProblemError, UnknownSpaceError
 from planners.kernels.footprint import pose_clear
+from planners.links import centres_around, links
 from planners.problem import PlanningProblem
 from planners.rounding import rounding_at, slack_at
 from planners.route import Route
@@ -165,8 +166,8 @@ def nearest_place(
 
     It is one from which one gets somewhere. Of places for a start, only those count from which
     the goal can be reached, and the reverse. Where the other end is in no place for the footprint
-    itself, only those in the largest connected part of the map count: a problem whose start and
-    goal are both replaced by their nearest places has a route.
+    itself, or joined to no cell, only those in the largest connected part of the map count: a
+    problem whose start and goal are both replaced by their nearest places has a route.
 
     Parameters
     ----------
@@ -181,7 +182,8 @@ def nearest_place(
     problem = space.problem
     free = space.stand if yaw is None else ~space.blocked
     other = problem.goal_xy if place == "start" else problem.start_xy
-    cells = np.argwhere(_part_around(space, free, other))
+    radius = space.radius if yaw is None else 0.0
+    cells = np.argwhere(_part_around(space, free, other, radius=radius))
     centres: Floats = space.window.cell_to_world(cells)
     away = np.hypot.reduce(centres - xy, axis=1)
     if yaw is None:
@@ -193,21 +195,28 @@ def nearest_place(
     return None
 
 
-def _part_around(space: Space, free: Bools, xy: Point) -> Bools:
-    """Return the cells that are connected to those around a place; else the largest part.
+def _part_around(space: Space, free: Bools, xy: Point, *, radius: float) -> Bools:
+    """Return the cells that are connected to a place; if there are none, the largest part.
 
     Moves lead over the sides of cells, as all cells that a diagonal move spans are free.
     """
     parts, count = ndimage.label(free)
-    position = space.to_cells(xy)[0][::-1] - 0.5
-    low = np.clip(np.floor(position), 0, free.shape).astype(np.int64)
-    high = np.clip(np.ceil(position) + 1, 0, free.shape).astype(np.int64)
-    around = np.unique(parts[tuple(map(slice, low, high))])
+    around = np.unique(parts[tuple(_cells_around(space, xy, radius=radius).T)])
     around = around[around > 0]
     if len(around) == 0 and count > 0:
         around = np.array([1 + np.bincount(parts.ravel())[1:].argmax()])
     part: Bools = np.isin(parts, around)
     return part
+
+
+def _cells_around(space: Space, xy: Point, *, radius: float) -> Ints:
+    """Return the cells that a disc's place is joined to; of a ball's on voxels, those around it."""
+    if isinstance(space, Costmap):
+        return links(space, (xy[0], xy[1]), radius=radius).cells
+    position = space.to_cells(xy)[0][::-1]
+    around = product(*(centres_around(at, 0.0) for at in position.tolist()))
+    cells = np.array(list(around), dtype=np.int64)
+    return cells[space.window.contains(cells)]
 
 
 def _check_in_window(space: Space, place: Place, xy: Point) -> None:
@@ -255,9 +264,9 @@ def _touches_tile(problem: PlanningProblem, xy: Point, margin: float) -> bool:
     ranges = [
         range(math.ceil(at - reach) - 1, math.floor(at + reach) + 1) for at in position.tolist()
     ]
-    indices: Iterable[tuple[int, ...]] = product(*ranges)
-    if math.prod(map(len, ranges)) > MOST_LOOKUPS:
-        indices = (index for index, _ in grid.tiles())
+    indices: Iterable[tuple[int, ...]] = (index for index, _ in grid.tiles())
+    if math.prod(each.stop - each.start for each in ranges) <= MOST_LOOKUPS:
+        indices = product(*ranges)
     for index in indices:
         first = np.array(index)
         away = np.maximum(np.maximum(first - position, position - first - 1), 0.0)
