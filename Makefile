@@ -13,7 +13,7 @@ INSTALLED := .venv/.installed
 READY := .venv/.ready
 WHEEL_VENV := .wheel-venv
 
-.PHONY: help setup demo test check crash-matrix fuzz size wheel-test clean
+.PHONY: help setup demo test check crash-matrix fuzz size docs wheel-test release clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "%-12s %s\n", $$1, $$2}' Makefile
@@ -36,7 +36,7 @@ demo: $(INSTALLED) ## Map a recorded courtyard and plan through it; writes groun
 test: $(READY) ## Run the tests and the doctests
 	$(BIN)/pytest -n $(WORKERS)
 
-check: $(READY) ## Check format, lint, types and import contracts
+check: $(READY) ## Check format, lint, types, import contracts
 	$(BIN)/ruff format --check
 	$(BIN)/ruff check
 	$(BIN)/mypy
@@ -52,6 +52,16 @@ fuzz: $(READY) ## Fuzz readers and API (FILES, CALLS, SECONDS, SEED), then seek 
 	cd tests && PYTHONPATH=. '$(CURDIR)/$(BIN)/python' -m fuzz --files $(FILES) --calls $(CALLS) --seconds $(SECONDS) $(addprefix --seed ,$(SEED)) --keep '$(CURDIR)/fuzz-failures'
 	$(BIN)/pytest -n $(WORKERS) -m hypothesis --hypothesis-profile=explore
 
+docs: $(READY) ## Build the documentation in docs/_build/html; warnings are errors
+	$(BIN)/python -m pip install --quiet --editable '.[docs]'
+	rm -rf docs/_build docs/api
+	$(BIN)/python tools/make_api.py docs/api
+	$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build/html
+	@echo 'Open docs/_build/html/index.html'
+
+release: $(READY) ## Set the version, date the changelog, commit and tag: make release VERSION=0.2.0
+	$(BIN)/python tools/release.py $(VERSION)
+
 wheel-test: $(READY) ## Build the wheel, install it alone, run the tests against it
 	rm -rf dist
 	$(BIN)/python -m build --wheel --no-isolation --outdir dist
@@ -59,5 +69,5 @@ wheel-test: $(READY) ## Build the wheel, install it alone, run the tests against
 	cd $(WHEEL_VENV) && bin/pytest -n $(WORKERS) -c '$(CURDIR)/pyproject.toml' --installed '$(CURDIR)/tests' '$(CURDIR)/scenarios' --pyargs groundmap planners
 
 clean: ## Remove everything that the other targets made
-	rm -rf .venv $(WHEEL_VENV) dist groundmap-demo fuzz-failures .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf .venv $(WHEEL_VENV) dist groundmap-demo fuzz-failures docs/_build docs/api .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find groundmap planners tests tools -name __pycache__ -type d -prune -exec rm -rf {} +
