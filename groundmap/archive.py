@@ -21,7 +21,7 @@ import numpy.typing as npt
 from groundmap.array_files import read_arrays
 from groundmap.documents import WrongDocumentError, parse_json
 from groundmap.errors import FileFormatError
-from groundmap.files import reason_of
+from groundmap.files import check_name, reason_of
 
 TEMPORARY = ".groundmap-"  # what the names of files begin with until they are whole
 
@@ -29,6 +29,7 @@ TEMPORARY = ".groundmap-"  # what the names of files begin with until they are w
 def write_atomically(path: str | PathLike[str], write: Callable[[IO[bytes]], object]) -> None:
     """Call `write` on a temporary file beside `path`, then rename it: all or nothing."""
     target = Path(path)
+    check_name(target, "a file that can be written")
     _check_regular(target)
     # Its name does not hold the target's, which may be as long as the system takes.
     handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=TEMPORARY)

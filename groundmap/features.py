@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field, replace
-from numbers import Real
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import Bools, Floats, Ints, as_floats
+from groundmap.arrays import Bools, Floats, Ints, as_floats, as_number
 from groundmap.camera import StereoRig
 from groundmap.errors import InputError
 from groundmap.frames import check_transform
@@ -127,8 +126,8 @@ class View:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_map_base", check_transform("T_map_base", self.T_map_base))
-        if self.timestamp is not None and not isinstance(self.timestamp, (Real, np.floating)):
-            raise InputError("timestamp", "a number [s], or none", repr(self.timestamp)[:60])
+        if self.timestamp is not None:
+            object.__setattr__(self, "timestamp", _as_time(self.timestamp))
         dropped = Counter(self.dropped)
         for name in ("points", "segments"):
             features: Features = getattr(self, name)
@@ -265,6 +264,13 @@ def _as_ids(name: str, ids: npt.ArrayLike) -> Ints:
     if array.dtype.kind == "u" and (array > np.iinfo(np.int64).max).any():
         raise InputError(name, "whole numbers within 64 bits", str(array.max()))
     return array.astype(np.int64)
+
+
+def _as_time(timestamp: object) -> float:
+    """Return a time stamp as a float: finite or not, as `groundmap.write_views` tells."""
+    if isinstance(timestamp, (float, np.floating)):
+        return float(timestamp)
+    return as_number("timestamp", timestamp, "a number [s], or none")
 
 
 def _no_features(ends: tuple[int, ...]) -> Features:

@@ -78,6 +78,24 @@ def read_file(path: str | PathLike[str], expected: str, *, most: int) -> bytes:
     return content
 
 
+def check_name(path: str | PathLike[str], expected: str) -> None:
+    """Check that a file or folder can have such a name, before it is asked for or made.
+
+    Raises
+    ------
+    FileFormatError
+        A name that the system takes for no file or folder, such as one with NUL in it.
+    """
+    try:
+        os.lstat(path)
+    except (FileNotFoundError, NotADirectoryError):
+        return
+    except OSError as error:
+        raise FileFormatError(path, expected, reason_of(error)) from error
+    except ValueError as error:  # NUL, or an unpaired surrogate
+        raise FileFormatError(path, expected, "a name that no file can have") from error
+
+
 def reason_of(error: OSError) -> str:
     """Return what the system says, in lower case, such as ``permission denied``."""
     return (error.strerror or str(error)).lower()

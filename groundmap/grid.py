@@ -104,7 +104,9 @@ class ConfidenceGrid:
 
     def tile(self, index: Index) -> Tile:
         """Return the tile of that index, allocated on first touch."""
-        return self._tiles.touch(index)
+        if np.ndim(index) != 1:
+            raise InputError("index", f"{self.ndim} whole numbers", repr(index)[:60])
+        return self._tiles.touch(tuple(as_cells("index", index, self.ndim)[0].tolist()))
 
     def tiles(self) -> Iterator[tuple[Index, Tile]]:
         """Iterate over (index, tile) in the order of the indices."""
@@ -209,8 +211,9 @@ class ConfidenceGrid:
             Evidence that is NaN or beyond [-1, 1], or a cell too far off to count.
         """
         lower = as_cells("lower", lower, self.ndim)[0]
-        if np.ndim(z) != self.ndim or np.asarray(z).dtype.kind not in "biuf":
-            got = f"{np.asarray(z).dtype} of shape {np.shape(z)}"
+        z = np.asarray(z)
+        if z.ndim != self.ndim or z.dtype.kind not in "biuf":
+            got = f"{z.dtype} of shape {z.shape}"
             raise InputError("z", f"evidence in {self.ndim} dimensions", got)
         if not (np.abs(z) <= 1.0).all():
             raise InputError("z", "evidence in [-1, 1]", "NaN or numbers beyond")

@@ -10,6 +10,8 @@ from dataclasses import replace
 from queue import SimpleQueue
 from typing import Any, NamedTuple, TypeAlias
 
+import numpy as np
+
 from groundmap.arrays import Floats
 from planners.answers import check_on_map
 from planners.costmap import Costmap
@@ -127,7 +129,7 @@ def _problems(
         raise ProblemError(
             "grid", "a 2-D map", f"a {problem.grid.ndim}-D one", hint="Use `plan` for each pair."
         )
-    if not isinstance(pairs, Iterable):
+    if not isinstance(pairs, Iterable) or (isinstance(pairs, np.ndarray) and pairs.ndim == 0):
         raise ProblemError("pairs", "pairs of a start and a goal", repr(pairs))
     problems = []
     for i, pair in enumerate(pairs):

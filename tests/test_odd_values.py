@@ -5,18 +5,29 @@ from __future__ import annotations
 from collections.abc import Callable
 from decimal import Decimal
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 from matplotlib.figure import Figure
 
-from groundmap import ConfidenceGrid, GroundPlane, GroundSettings, MapperSettings, StereoRig, View
+from groundmap import (
+    ConfidenceGrid,
+    GroundPlane,
+    GroundSettings,
+    MapperSettings,
+    StereoRig,
+    View,
+    read_views,
+    write_views,
+)
 from groundmap.arrays import as_number, is_number
 from groundmap.draw import draw_curves, draw_graph, draw_route, draw_trajectory, new_figure
-from groundmap.errors import CameraError, InputError, SettingsError
+from groundmap.errors import CameraError, FileFormatError, InputError, SettingsError
 from groundmap.ground_fit import fit_ground
-from groundmap.simulate import DriveSettings, Solid, World, drive
+from groundmap.simulate import DriveSettings, Hole, Solid, World, drive, strew
 from groundmap.simulate.shapes import box, pole, wall
 from planners import Footprint, PlanningProblem, distance_field, plan, plan_many, shortcut, smooth
 from planners.errors import ProblemError
@@ -181,3 +192,35 @@ def test_options_of_queries_are_checked() -> None:
     with pytest.raises(ProblemError, match=r"^clearance: expected a distance of 0 or more"):
         shortcut(posed, plan(posed), clearance=huge)
     assert shortcut(posed, plan(posed), clearance=long).audit == "clean"
+
+
+@pytest.mark.parametrize("name", ["a\x00b", "\ud800", "x" * 5000])
+def test_names_that_no_file_can_have_are_refused(name: str, tmp_path: Path) -> None:
+    view = View.from_pixels(np.eye(4), StereoRig(**RIG), points_px=[(9, 8, 1)])
+    with pytest.raises(FileFormatError, match="expected a new or empty folder, got"):
+        write_views([view], tmp_path / name)
+    with pytest.raises(FileFormatError, match="expected a folder of views, got"):
+        read_views(tmp_path / name)
+    with pytest.raises(FileFormatError, match="expected a file that can be written, got"):
+        ConfidenceGrid().save(tmp_path / name)
+
+
+def test_the_walls_of_holes_count_as_a_world_s_landmarks() -> None:
+    world = World(bounds=(0, 0, 8, 8), holes=(Hole(shapely.box(5, 5, 6, 6), depth=1e9),))
+    with pytest.raises(InputError, match=r"^world: expected 1e\+06 landmarks at most"):
+        strew(world, np.random.default_rng(1))
+
+
+@pytest.mark.parametrize("index", [1, (0.5, 0), (2**70, 0), ("a", "b"), (0, 0, 0), [(0, 0)]])
+def test_a_tile_has_whole_numbers_for_an_index(index: Any) -> None:
+    with pytest.raises(InputError, match=r"^index: expected"):
+        ConfidenceGrid().tile(index)
+
+
+def test_a_time_stamp_is_a_number() -> None:
+    half: Any = Fraction(1, 2)
+    stamp: Any = "now"
+    view = View(T_map_base=np.eye(4), rig=StereoRig(**RIG), timestamp=half)
+    assert isinstance(view.timestamp, float)
+    with pytest.raises(InputError, match=r"^timestamp: expected a number"):
+        View(T_map_base=np.eye(4), rig=StereoRig(**RIG), timestamp=stamp)

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from groundmap.arrays import Floats
 from groundmap.errors import InputError
 from groundmap.features import Features, View
+from groundmap.files import check_name
 from groundmap.frames import to_quaternion
 from groundmap.io.columns import KINDS, LARGEST_ID, LAYOUTS, Kind, values_of
 from groundmap.io.folder import ARCHIVE, POSES, RIG, TABLES
@@ -58,6 +59,7 @@ def write_views(
     """
     if features not in WRITERS:
         raise InputError("features", f"one of {', '.join(WRITERS)}", repr(features))
+    check_name(path, "a new or empty folder")
     target = Path(path).resolve()
     _check_target(target, overwrite)
     with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as scratch:

@@ -7,6 +7,7 @@ from os import PathLike
 from pathlib import Path
 
 from groundmap.errors import FileFormatError, InputError
+from groundmap.files import check_name
 from groundmap.io.folder import FolderLog
 from groundmap.io.gtsam import GtsamLog
 from groundmap.io.log import ViewLog
@@ -63,6 +64,7 @@ def read_views(
     folder = Path(path)
     if format is not None and format not in FORMATS:
         raise InputError("format", f"one of {', '.join(_nearest_first(format))}", repr(format))
+    check_name(folder, "a folder of views")
     if not folder.is_dir():
         if folder.exists():
             hint = "Give the folder that holds it."

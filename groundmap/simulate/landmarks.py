@@ -82,6 +82,8 @@ def strew(world: World, rng: np.random.Generator) -> Landmarks:
 
 def _check_number(world: World) -> None:
     count = (world.ground_texture + world.ground_lines) * _ground_area(world)
+    for hole in world.holes:
+        count += world.ground_texture * hole.outline.length * hole.depth
     for solid in world.solids:
         sides = solid.outline.length * (solid.top - solid.bottom)
         count += (solid.texture + 2.0 * solid.lines) * sides + solid.texture * solid.outline.area
