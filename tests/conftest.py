@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import signal
 import sysconfig
 from itertools import count
 from pathlib import Path
@@ -70,6 +71,9 @@ def pytest_report_header() -> list[str]:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    # A shell's background job inherits that Ctrl-C is ignored; tests of interrupts send it.
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     if not config.getoption("--installed"):
         return
     site_packages = Path(sysconfig.get_path("purelib")).resolve()
