@@ -29,7 +29,16 @@ from groundmap.errors import CameraError, FileFormatError, InputError, SettingsE
 from groundmap.ground_fit import fit_ground
 from groundmap.simulate import DriveSettings, Hole, Solid, World, drive, strew
 from groundmap.simulate.shapes import box, pole, wall
-from planners import Footprint, PlanningProblem, distance_field, plan, plan_many, shortcut, smooth
+from planners import (
+    Footprint,
+    PlanningProblem,
+    Roadmap,
+    distance_field,
+    plan,
+    plan_many,
+    shortcut,
+    smooth,
+)
 from planners.errors import ProblemError
 
 RIG: dict[str, Any] = {"fx": 700.0, "fy": 700.0, "cx": 320.0, "cy": 240.0, "baseline": 0.5}
@@ -224,3 +233,9 @@ def test_a_time_stamp_is_a_number() -> None:
     assert isinstance(view.timestamp, float)
     with pytest.raises(InputError, match=r"^timestamp: expected a number"):
         View(T_map_base=np.eye(4), rig=StereoRig(**RIG), timestamp=stamp)
+
+
+def test_who_grows_a_roadmap_is_a_name() -> None:
+    planner: Any = np.array(["prm", "prmstar"])
+    with pytest.raises(ProblemError, match=r"^planner: expected 'prm' or 'prmstar'"):
+        Roadmap.grow(problem(), planner=planner)
