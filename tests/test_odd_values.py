@@ -122,8 +122,12 @@ def test_a_camera_height_is_checked_before_the_first_view() -> None:
 
 
 def test_settings_that_no_computation_can_hold_are_refused() -> None:
-    with pytest.raises(SettingsError, match=r"^support_width: expected a number within 1e\+09"):
+    with pytest.raises(SettingsError, match=r"^support_width: expected less than or equal to"):
         MapperSettings(support_width=1e300)
+    with pytest.raises(
+        SettingsError, match=r"^drift: expected a number within 1e\+09, got 1e\+300"
+    ):
+        DriveSettings(stops=((0, 0, 0),), drift=1e300)
     with pytest.raises(SettingsError, match=r"^window: expected less than or equal to 10000"):
         GroundSettings(window=2**62)
 
