@@ -29,7 +29,16 @@ from groundmap.errors import CameraError, FileFormatError, InputError, SettingsE
 from groundmap.ground_fit import fit_ground
 from groundmap.simulate import DriveSettings, Hole, Solid, World, drive, strew
 from groundmap.simulate.shapes import box, pole, wall
-from planners import Footprint, PlanningProblem, distance_field, plan, plan_many, shortcut, smooth
+from planners import (
+    Footprint,
+    PlanningProblem,
+    Roadmap,
+    distance_field,
+    plan,
+    plan_many,
+    shortcut,
+    smooth,
+)
 from planners.errors import ProblemError
 
 RIG: dict[str, Any] = {"fx": 700.0, "fy": 700.0, "cx": 320.0, "cy": 240.0, "baseline": 0.5}
@@ -113,8 +122,12 @@ def test_a_camera_height_is_checked_before_the_first_view() -> None:
 
 
 def test_settings_that_no_computation_can_hold_are_refused() -> None:
-    with pytest.raises(SettingsError, match=r"^support_width: expected a number within 1e\+09"):
+    with pytest.raises(SettingsError, match=r"^support_width: expected less than or equal to"):
         MapperSettings(support_width=1e300)
+    with pytest.raises(
+        SettingsError, match=r"^drift: expected a number within 1e\+09, got 1e\+300"
+    ):
+        DriveSettings(stops=((0, 0, 0),), drift=1e300)
     with pytest.raises(SettingsError, match=r"^window: expected less than or equal to 10000"):
         GroundSettings(window=2**62)
 
@@ -224,3 +237,9 @@ def test_a_time_stamp_is_a_number() -> None:
     assert isinstance(view.timestamp, float)
     with pytest.raises(InputError, match=r"^timestamp: expected a number"):
         View(T_map_base=np.eye(4), rig=StereoRig(**RIG), timestamp=stamp)
+
+
+def test_who_grows_a_roadmap_is_a_name() -> None:
+    planner: Any = np.array(["prm", "prmstar"])
+    with pytest.raises(ProblemError, match=r"^planner: expected 'prm' or 'prmstar'"):
+        Roadmap.grow(problem(), planner=planner)

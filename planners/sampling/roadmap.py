@@ -253,7 +253,7 @@ def _ways_of(
     for name in settings:
         if name not in GROWTH + QUERIES:
             raise SettingsError(name, f"one of {', '.join(GROWTH + QUERIES)}", "another setting")
-    if planner not in GROWERS:
+    if not isinstance(planner, str) or planner not in GROWERS:
         raise ProblemError("planner", " or ".join(map(repr, GROWERS)), repr(planner))
     if planner == "prmstar" and told.max_nearest_neighbors is not None:
         expected = "none for 'prmstar', which takes more and more"

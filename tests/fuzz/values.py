@@ -86,7 +86,8 @@ def _one_entry(values: Any, draw: Draw) -> Any:
         return values
     place = draw.whole(0, values.size - 1)
     try:
-        values.reshape(-1)[place] = entry
+        with np.errstate(over="ignore"):
+            values.reshape(-1)[place] = entry
     except (OverflowError, ValueError):
         values = values.astype(object)
         values.reshape(-1)[place] = entry
