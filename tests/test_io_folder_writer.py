@@ -45,7 +45,7 @@ def random_features(rng: np.random.Generator, shape: tuple[int, ...]) -> tuple[F
     xyz = rng.normal(size=(*shape, 3)) * 10.0 ** rng.uniform(-6, 6, (*shape, 1))
     xyz[..., 2] = np.abs(xyz[..., 2]) + 1e-9
     half = rng.normal(size=(*shape, 3, 3))
-    covariance = half + np.swapaxes(half, -1, -2)
+    covariance = half @ np.swapaxes(half, -1, -2)
     return xyz, covariance
 
 
@@ -85,15 +85,19 @@ def test_views_come_back_as_they_were_written(
 
 
 @given(
-    numbers=st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=8, max_size=8),
-    depth=st.floats(min_value=5e-324, allow_infinity=False),
+    xy=st.tuples(st.floats(-1e8, 1e8), st.floats(-1e8, 1e8)),
+    depth=st.floats(min_value=5e-324, max_value=1e7),
+    variances=st.lists(st.floats(min_value=0.0, allow_infinity=False), min_size=3, max_size=3),
     features=st.sampled_from(["csv", "npz"]),
 )
 def test_every_finite_float_comes_back_bit_by_bit(
-    tmp_path_factory: pytest.TempPathFactory, numbers: list[float], depth: float, features: str
+    tmp_path_factory: pytest.TempPathFactory,
+    xy: tuple[float, float],
+    depth: float,
+    variances: list[float],
+    features: str,
 ) -> None:
-    x, y, a, b, c, d, e, f = numbers
-    points = Features.points([(x, y, depth)], [[(a, b, c), (b, d, e), (c, e, f)]])
+    points = Features.points([(*xy, depth)], [np.diag(variances)])
     path = tmp_path_factory.mktemp("floats") / "views"
     write_views([View(T_map_base=np.eye(4), rig=RIG, points=points)], path, features=features)
     (view,) = read_views(path)
