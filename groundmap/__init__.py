@@ -1,16 +1,16 @@
 """From sparse stereo features to a map one can plan on."""
 
-from groundmap.camera import StereoRig
 from groundmap.errors import GroundmapError
-from groundmap.features import Features, View
-from groundmap.grid import ConfidenceGrid
-from groundmap.ground import GroundPlane
-from groundmap.ground_fit import fit_ground
+from groundmap.grid.grid import ConfidenceGrid
+from groundmap.grid.window import CellState, GridWindow
 from groundmap.io import load_map, read_views, write_views
-from groundmap.jumps import pose_jumps
 from groundmap.mapper import GroundMapper
 from groundmap.settings import GroundSettings, MapperSettings
-from groundmap.window import CellState, GridWindow
+from groundmap.view.ground_fit import fit_ground
+from groundmap.view.ground_plane import GroundPlane
+from groundmap.view.jumps import pose_jumps
+from groundmap.view.stereo_rig import StereoRig
+from groundmap.view.view import Features, View
 
 __all__ = [
     "CellState",

@@ -40,14 +40,14 @@ def as_floats(name: str, values: npt.ArrayLike, shape: tuple[int | None, ...]) -
         ...
     groundmap.errors.InputError: points: expected shape (n, 2), got shape (2,).
     """
-    array = as_numbers(name, values, f"numbers of shape {_shown(shape)}")
+    array = as_numbers(name, values, f"numbers of shape {_format(shape)}")
     if array.size == 0 and None in shape and array.ndim != len(shape):
         array = array.reshape([0 if length is None else length for length in shape])
     fits = array.ndim == len(shape) and all(
         wanted is None or wanted == got for wanted, got in zip(shape, array.shape, strict=True)
     )
     if not fits:
-        raise InputError(name, f"shape {_shown(shape)}", f"shape {array.shape}")
+        raise InputError(name, f"shape {_format(shape)}", f"shape {array.shape}")
     return array
 
 
@@ -64,7 +64,7 @@ def as_positions(name: str, values: npt.ArrayLike, length: int) -> Floats:
     >>> as_positions("xy", (1, 2), 2)
     array([[1., 2.]])
     """
-    array = as_numbers(name, values, f"numbers of shape {_shown((None, length))}")
+    array = as_numbers(name, values, f"numbers of shape {_format((None, length))}")
     positions = as_floats(name, np.atleast_2d(array), (None, length))
     check_finite(name, positions)
     return positions
@@ -83,7 +83,7 @@ def as_cells(name: str, values: npt.ArrayLike, ndim: int) -> Ints:
     >>> as_cells("cells", [0, 2], 2)
     array([[0, 2]])
     """
-    expected = f"whole numbers of shape {_shown((None, ndim))}"
+    expected = f"whole numbers of shape {_format((None, ndim))}"
     try:
         given = np.asarray(values)
     except ValueError as error:
@@ -193,6 +193,6 @@ def as_numbers(name: str, values: npt.ArrayLike, expected: str) -> Floats:
         raise InputError(name, expected, repr(values)[:60]) from error
 
 
-def _shown(shape: tuple[int | None, ...]) -> str:
+def _format(shape: tuple[int | None, ...]) -> str:
     inside = ", ".join("n" if length is None else str(length) for length in shape)
     return f"({inside},)" if len(shape) == 1 else f"({inside})"

@@ -9,20 +9,21 @@ from typing import Any
 import numpy as np
 
 from groundmap.arrays import Floats, Ints
-from groundmap.camera import StereoRig
-from groundmap.evidence import Evidence, drop_off_cells, evidence_of
-from groundmap.features import View
-from groundmap.frames import map_from_world
-from groundmap.fusion import RULES
-from groundmap.grid import ConfidenceGrid
-from groundmap.ground import GroundPlane
-from groundmap.heights import FlatView, flatten
+from groundmap.evidence.evidence import Evidence
+from groundmap.evidence.ground_plane.height_classes import GroundView, flatten
+from groundmap.evidence.ground_plane.rasterised import drop_off_cells, evidence_of
+from groundmap.evidence.ground_plane.ray_smoothing import smooth_features
+from groundmap.evidence.ground_plane.surfaces import Surfaces, find_surfaces
+from groundmap.evidence.ground_plane.visibility import SightFan, visible_freespace
+from groundmap.evidence.triangulation import Mesh, triangulate
+from groundmap.grid.fusion import RULES
+from groundmap.grid.grid import ConfidenceGrid
 from groundmap.settings import MapperSettings
-from groundmap.sight2d import SightFan, visible_freespace
-from groundmap.smoothing import smoothed
-from groundmap.stages import Stages
-from groundmap.surfaces import Surfaces, find_surfaces
-from groundmap.triangulation import Mesh, triangulate
+from groundmap.stopwatch import Stopwatch
+from groundmap.view.frames import map_from_world
+from groundmap.view.ground_plane import GroundPlane
+from groundmap.view.stereo_rig import StereoRig
+from groundmap.view.view import View
 
 
 @dataclass
@@ -40,7 +41,7 @@ class MapperStats:
 class ViewParts:
     """One view taken apart, as `GroundMapper.explain` returns it."""
 
-    flat: FlatView  #: features by height class
+    ground_view: GroundView  #: features by height class
     mesh: Mesh  #: their triangulation
     surfaces: Surfaces
     fan: SightFan
@@ -52,7 +53,7 @@ class GroundMapper:
 
     Parameters
     ----------
-    stages : Stages, optional
+    stages : Stopwatch, optional
         Stopwatch to count the time of each step with, if it is to be shared.
     **settings
         `groundmap.settings.MapperSettings`: ``resolution`` [m/cell], ``fusion``, ``uncertainty``,
@@ -66,7 +67,7 @@ class GroundMapper:
     Examples
     --------
     >>> from groundmap import StereoRig, View, fit_ground
-    >>> from groundmap.frames import map_from_world
+    >>> from groundmap.view.frames import map_from_world
     >>> rig = StereoRig(fx=700.0, fy=700.0, cx=320.0, cy=240.0, baseline=0.5)
     >>> seen = [(320.0, 250.0, 450.0)]  # one ground feature, 5 m ahead and 1.5 m below
     >>> view = View.from_pixels(map_from_world(np.eye(4), "optical"), rig, points_px=seen)
@@ -77,7 +78,7 @@ class GroundMapper:
     array([-1.,  0.], dtype=float32)
     """
 
-    def __init__(self, *, stages: Stages | None = None, **settings: Any) -> None:
+    def __init__(self, *, stages: Stopwatch | None = None, **settings: Any) -> None:
         self.settings = MapperSettings(**settings)
         parameters = {"cap": self.settings.cap} if self.settings.fusion == "capped" else {}
         self.grid = ConfidenceGrid(
@@ -86,7 +87,7 @@ class GroundMapper:
             rule=RULES[self.settings.fusion](**parameters),
         )
         self.stats = MapperStats()
-        self.stages = stages or Stages()
+        self.stages = stages or Stopwatch()
         #: Cells of the grid that the last view changed, [row, col], shape (n, 2): what a planner
         #: that replans as the map grows has to look at.
         self.changed: Ints = np.empty((0, 2), dtype=np.int64)
@@ -108,33 +109,33 @@ class GroundMapper:
             ground or the sky.
         """
         parts = self.explain(view)
-        with self.stages.timed("fuse"):
+        with self.stages.measure("fuse"):
             lower, z = parts.evidence.lower, parts.evidence.z
-            drop_offs = drop_off_cells(parts.flat, self.grid)
+            drop_offs = drop_off_cells(parts.ground_view, self.grid)
             self.grid.fuse(lower, z)
             self.grid.add_drop_offs(drop_offs)
             self.changed = np.concatenate([np.argwhere(z) + lower, drop_offs])
             self.grid.trajectory = np.concatenate([self.grid.trajectory, _pose2d(view)])
         self.stats.views += 1
-        self.stats.features_used += parts.flat.used
-        self.stats.features_dropped.update(parts.flat.dropped)
+        self.stats.features_used += parts.ground_view.used
+        self.stats.features_dropped.update(parts.ground_view.dropped)
         self.stats.seen_through += parts.fan.contradictions.features
         self.stats.through_viewpoint += parts.surfaces.through_viewpoint
 
     def explain(self, view: View) -> ViewParts:
         """Return what `integrate` would fuse, with every step on the way; changes nothing."""
-        with self.stages.timed("heights"):
-            flat = flatten(view, self.settings, number=self.stats.views)
-            flat = smoothed(flat, self.settings)
-        with self.stages.timed("triangulate"):
-            mesh = triangulate(flat.points, flat.segments)
-        with self.stages.timed("surfaces"):
-            surfaces = find_surfaces(flat, mesh, self.settings)
-        with self.stages.timed("sight"):
-            fan = visible_freespace(flat, surfaces, self.settings)
-        with self.stages.timed("evidence"):
-            evidence = evidence_of(flat, surfaces, fan, self.grid, self.settings)
-        return ViewParts(flat, mesh, surfaces, fan, evidence)
+        with self.stages.measure("heights"):
+            ground_view = flatten(view, self.settings, number=self.stats.views)
+            ground_view = smooth_features(ground_view, self.settings)
+        with self.stages.measure("triangulate"):
+            mesh = triangulate(ground_view.points, ground_view.segments)
+        with self.stages.measure("surfaces"):
+            surfaces = find_surfaces(ground_view, mesh, self.settings)
+        with self.stages.measure("sight"):
+            fan = visible_freespace(ground_view, surfaces, self.settings)
+        with self.stages.measure("evidence"):
+            evidence = evidence_of(ground_view, surfaces, fan, self.grid, self.settings)
+        return ViewParts(ground_view, mesh, surfaces, fan, evidence)
 
 
 def _pose2d(view: View) -> Floats:

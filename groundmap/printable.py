@@ -42,13 +42,13 @@ def printable(text: str, *, most: int = MOST_OF_A_SENTENCE, lines: bool = False)
     return _cut("".join(escaped), most)
 
 
-def shown(value: object, *, most: int = MOST_OF_A_VALUE) -> str:
+def format_value(value: object, *, most: int = MOST_OF_A_VALUE) -> str:
     r"""Return a value as Python writes it, printable and cut in the middle if too long.
 
     Examples
     --------
-    >>> print(shown("one\ttwo"), shown(10**5000), shown(list(range(1000)), most=21), sep="; ")
-    'one\ttwo'; a number of more than 4300 digits; [0, 1, 2,...998, 999]
+    >>> print(format_value("one\ttwo"), format_value(10**5000), format_value(list(range(1000)),
+    most=21), sep="; ") 'one\ttwo'; a number of more than 4300 digits; [0, 1, 2,...998, 999]
     """
     try:
         text = repr(value)

@@ -8,7 +8,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from groundmap.errors import SettingsError
-from groundmap.printable import shown
+from groundmap.printable import format_value
 
 LARGEST_NUMBER = 1e9  # of any setting: squares and sums of such are still exact enough, and finite
 LARGEST = 1e4  # of lengths [m], ratios and angles: nothing that a rig sees needs more
@@ -53,7 +53,7 @@ unknown key. Did you mean 'resolution'?
             if first["type"] == "missing":
                 raise SettingsError(name, "a value", "none") from None
             expected = first["msg"].removeprefix("Input should be ")
-            raise SettingsError(name, expected, shown(first["input"])) from None
+            raise SettingsError(name, expected, format_value(first["input"])) from None
         for name, value in self:
             if isinstance(value, float) and abs(value) > LARGEST_NUMBER:
                 raise SettingsError(name, f"a number within {LARGEST_NUMBER:g}", f"{value:g}")

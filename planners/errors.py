@@ -22,15 +22,15 @@ that don't exist or are out of range raise `groundmap.errors.SettingsError`, as 
 from __future__ import annotations
 
 from groundmap.errors import FactualError, WrongValueError
-from planners.wording import (
+from planners.error_messages import (
     Place,
     Point,
     Turning,
     footprint_clause,
+    format_place,
+    format_point,
     left_clause,
-    named_place,
     nearest_clause,
-    shown,
     widest_clause,
 )
 
@@ -83,7 +83,7 @@ y -9.75 to 9.75 m (box around the touched tiles); nothing was ever seen near it.
             else "which is empty"
         )
         super().__init__(
-            f"{named_place(place, xy)}: outside the map: expected a place on it, {extent}; "
+            f"{format_place(place, xy)}: outside the map: expected a place on it, {extent}; "
             f"nothing was ever seen near it.{nearest_clause(xy, nearest)}"
         )
 
@@ -111,7 +111,7 @@ class NonFreeError(NoRouteError):
         self.place, self.xy, self.clearance, self.needed = place, xy, clearance, needed
         self.nearest, self.yaw = nearest, yaw
         super().__init__(
-            f"{named_place(place, xy)}: {footprint_clause(needed, yaw)} overlaps non-free space; "
+            f"{format_place(place, xy)}: {footprint_clause(needed, yaw)} overlaps non-free space; "
             f"clearance there is {clearance:.2f} m.{nearest_clause(xy, nearest)}"
         )
 
@@ -139,7 +139,7 @@ begins 0.25 m away. Map that place, or plan with unknown='allow' (--unknown allo
         self.place, self.xy, self.clearance, self.needed = place, xy, clearance, needed
         self.nearest, self.yaw = nearest, yaw
         super().__init__(
-            f"{named_place(place, xy)}: {footprint_clause(needed, yaw)} overlaps unknown or "
+            f"{format_place(place, xy)}: {footprint_clause(needed, yaw)} overlaps unknown or "
             f"contested space, which begins {clearance:.2f} m away. "
             "Map that place, or plan with unknown='allow' (--unknown allow)."
             f"{nearest_clause(xy, nearest)}"
@@ -208,7 +208,7 @@ your footprint needs 0.60 m.
         way = widest_clause(widest_gap, needed, bottleneck, turning, slack=slack)
         super().__init__(
             f"no route: the {place} is fenced in: an enclosed {what} around it; the reachable "
-            f"cell nearest to the goal is {shown(nearest)}, {distance:.2f} m away"
+            f"cell nearest to the goal is {format_point(nearest)}, {distance:.2f} m away"
             f"{'; ' if way else '.'}{way}"
         )
 

@@ -10,17 +10,17 @@ import numpy as np
 import numpy.typing as npt
 
 from groundmap.arrays import Floats, Ints
-from planners.answers import check_on_map
-from planners.costmap import Costmap, whole_cells
-from planners.dstar_lite import DStarLite, DStarLiteSettings
-from planners.engine import now
+from planners.costmap.costmap import Costmap, whole_cells
+from planners.costmap.endpoint_check import check_on_map
+from planners.costmap.extent import padded_bounds
+from planners.error_messages import Point
 from planners.errors import ProblemError
-from planners.extent import padded_bounds
-from planners.problem import PlanningProblem
-from planners.rounding import slack_at
-from planners.route import Route
-from planners.solve import solve
-from planners.wording import Point
+from planners.geometry.rounding import slack_at
+from planners.problem.problem import PlanningProblem
+from planners.route.route import Route
+from planners.route.solve import solve
+from planners.search.base import now
+from planners.search.dstar_lite import DStarLite, DStarLiteSettings
 
 
 class IncrementalPlanner:
@@ -34,7 +34,7 @@ class IncrementalPlanner:
     problem : PlanningProblem
         Its grid is the live map; its start, where the robot is at first.
     **settings
-        Those of `planners.dstar_lite.DStarLiteSettings`.
+        Those of `planners.search.dstar_lite.DStarLiteSettings`.
 
     Raises
     ------
@@ -83,7 +83,7 @@ class IncrementalPlanner:
         """
         cells = whole_cells(changed)
         if self._costmap is not None:
-            self._costmap = self._costmap.updated(cells)
+            self._costmap = self._costmap.with_changes(cells)
 
     def plan(
         self,
@@ -143,7 +143,7 @@ class IncrementalPlanner:
         if not self.problem.avoids_unknown and (now != then).any():
             return Costmap.of(self.problem)  # what lies around the map may be driven on, too
         cells = np.concatenate([_unknown_cells(before), _unknown_cells(here)])
-        return here.updated(cells + before.lower_cell)
+        return here.with_changes(cells + before.lower_cell)
 
 
 def _ends(problem: PlanningProblem) -> tuple[Point, Point]:

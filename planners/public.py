@@ -1,12 +1,6 @@
 """The names that `planners` shows on the outside; it loads this module when one is asked for."""
 
-from planners.ara import ARASettings
-from planners.astar import AStarSettings, DijkstraSettings, WeightedAStarSettings
-from planners.auto import AutoSettings
-from planners.costs import CostSettings
-from planners.dstar_lite import DStarLiteSettings
-from planners.enclosure import widest_route
-from planners.engine import Improvement
+from planners.batch_planning import plan_many
 from planners.errors import (
     AuditError,
     CancelledError,
@@ -21,22 +15,29 @@ from planners.errors import (
     UnknownSpaceError,
     UnsolvedError,
 )
-from planners.fields import distance_field, reachable
-from planners.footprint import Footprint
-from planners.hybrid import HybridAStarSettings
 from planners.incremental import IncrementalPlanner
-from planners.jps import JPSPlusSettings, JPSSettings
-from planners.many import plan_many
-from planners.polyanya import PolyanyaSettings
-from planners.problem import PlanningProblem
-from planners.registry import OWN_PLANNERS, PLANNERS, plan
-from planners.route import Route
+from planners.no_route import widest_route
+from planners.planning import plan
+from planners.problem.costs import CostSettings
+from planners.problem.footprint import Footprint
+from planners.problem.problem import PlanningProblem
+from planners.registry import OWN_PLANNERS, PLANNERS
+from planners.route.route import Route
+from planners.route.shortcut import shortcut
+from planners.route.smooth import max_curvature, smooth
 from planners.sampling.roadmap import Roadmap
 from planners.sampling.settings import SamplingSettings
-from planners.shortcuts import shortcut
-from planners.smoother import max_curvature, smooth
-from planners.theta import LazyThetaSettings, ThetaSettings
-from planners.widest import WidestRoute
+from planners.search.ara import ARASettings
+from planners.search.astar import AStarSettings, DijkstraSettings, WeightedAStarSettings
+from planners.search.auto import AutoSettings
+from planners.search.base import Improvement
+from planners.search.distance_field import distance_field, reachable
+from planners.search.dstar_lite import DStarLiteSettings
+from planners.search.hybrid_astar import HybridAStarSettings
+from planners.search.jps import JPSPlusSettings, JPSSettings
+from planners.search.polyanya import PolyanyaSettings
+from planners.search.theta import LazyThetaSettings, ThetaSettings
+from planners.search.widest_path import WidestRoute
 
 __all__ = [
     "ARASettings",

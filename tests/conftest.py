@@ -14,7 +14,7 @@ import pytest
 
 import groundmap
 import planners
-from planners.engine import Clock, SearchSettings
+from planners.search.base import Clock, SearchSettings
 
 DEFAULT_LIMIT = SearchSettings().time_limit
 TICK = 1e-4  # [s] that pass at each look at the clock of `ticking`
@@ -55,7 +55,9 @@ def ticking(monkeypatch: pytest.MonkeyPatch) -> None:
     looks = count()
     for module in ("engine", "solve", "registry"):
         monkeypatch.setattr(f"planners.{module}.now", lambda: TICK * next(looks))
-    monkeypatch.setattr("planners.sampling.states.SOON", math.inf)  # looks by calls, not by time
+    monkeypatch.setattr(
+        "planners.sampling.ompl_states.SOON", math.inf
+    )  # looks by calls, not by time
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -9,8 +9,8 @@ import numpy.typing as npt
 from numpy.testing import assert_array_equal
 
 from groundmap.arrays import Counts, Floats, Ints
-from groundmap.grid import ConfidenceGrid
-from groundmap.window import GridWindow
+from groundmap.grid.grid import ConfidenceGrid
+from groundmap.grid.window import GridWindow
 
 Block = npt.NDArray[np.float32]
 

@@ -14,11 +14,11 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from groundmap.arrays import Bools, Floats, Ints
-from groundmap.evidence import Evidence
-from groundmap.heights import FlatView
-from groundmap.sight2d import SightFan
-from groundmap.surfaces import SurfaceKind, Surfaces
-from groundmap.triangulation import Mesh
+from groundmap.evidence.evidence import Evidence
+from groundmap.evidence.ground_plane.height_classes import GroundView
+from groundmap.evidence.ground_plane.surfaces import SurfaceKind, Surfaces
+from groundmap.evidence.ground_plane.visibility import SightFan
+from groundmap.evidence.triangulation import Mesh
 
 Cell: TypeAlias = tuple[int, int]
 
@@ -136,7 +136,7 @@ def visible_region(surfaces: Floats, chords: Floats) -> shapely.Geometry:
     return shapely.union(seen, ground)
 
 
-def support_chords(flat: FlatView, width: float, angle: float) -> Floats:
+def support_chords(flat: GroundView, width: float, angle: float) -> Floats:
     """Chord of each ground feature: its range, at bearings within min(width / range, angle).
 
     A chord ends where an image does, but reaches up to its feature in any case.
@@ -155,7 +155,7 @@ def support_chords(flat: FlatView, width: float, angle: float) -> Floats:
     return np.array(chords, dtype=np.float64).reshape(-1, 2, 2)
 
 
-def seen_between(flat: FlatView, radius: float) -> tuple[float, float]:
+def seen_between(flat: GroundView, radius: float) -> tuple[float, float]:
     """Bearings of the right and the left end of what both images see on a circle.
 
     On the left that is where the circle meets y + baseline = border x, the right image's border.
@@ -205,7 +205,7 @@ def sight_ranges(walls: Floats, granting: Bools, chords: Floats, bearings: Float
 
 
 def counted_against(
-    flat: FlatView, surfaces: Surfaces, slack: float
+    flat: GroundView, surfaces: Surfaces, slack: float
 ) -> tuple[Floats, list[set[int]]]:
     """For each surface, how many features are seen through it, by their shares; and which ones.
 
@@ -243,7 +243,7 @@ def counted_against(
     return against, which
 
 
-def places_without_ground(flat: FlatView, step: float) -> list[tuple[float, float]]:
+def places_without_ground(flat: GroundView, step: float) -> list[tuple[float, float]]:
     """Places along the lines to features below the ground, from where they go below its level.
 
     A line that is below it for more than 3 m has none, nor one with ground features beside it
@@ -349,7 +349,7 @@ def cells_in_disc(centre: Floats, radius: float, shape: tuple[int, int]) -> Bool
 # Evidence
 
 
-def in_map(flat: FlatView, xy: Floats) -> Floats:
+def in_map(flat: GroundView, xy: Floats) -> Floats:
     """From the frame of the view to the map."""
     x, y = flat.forward
     places: Floats = flat.viewpoint + xy @ np.array([(x, y), (-y, x)])

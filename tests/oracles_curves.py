@@ -15,9 +15,9 @@ import shapely
 from scipy.optimize import minimize
 
 from groundmap.arrays import Floats
-from planners.costmap import Costmap
-from planners.engine import Found
-from planners.hybrid import HybridAStarSettings
+from planners.costmap.costmap import Costmap
+from planners.search.base import SearchResult
+from planners.search.hybrid_astar import HybridAStarSettings
 
 Pose: TypeAlias = tuple[float, float, float]
 
@@ -86,7 +86,10 @@ def _misses(lengths: Floats, word: Sequence[float], goal: Pose) -> Floats:
 
 
 def check_steered(
-    costmap: Costmap, found: Found, ends: Sequence[Sequence[float]], settings: HybridAStarSettings
+    costmap: Costmap,
+    found: SearchResult,
+    ends: Sequence[Sequence[float]],
+    settings: HybridAStarSettings,
 ) -> None:
     """Check a route of poses: its ends, its steps, its curvature, and all that it sweeps."""
     poses, turns, chords = _poses(found)
@@ -105,7 +108,7 @@ def check_steered(
     _check_swept(costmap, poses, turns)
 
 
-def _poses(found: Found) -> tuple[Floats, Floats, Floats]:
+def _poses(found: SearchResult) -> tuple[Floats, Floats, Floats]:
     assert found.headings is not None
     poses = np.column_stack([found.waypoints, found.headings])
     turns = np.remainder(np.diff(poses[:, 2]) + np.pi, 2.0 * np.pi) - np.pi

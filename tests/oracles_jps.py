@@ -12,12 +12,14 @@ from oracles_planning import STEPS
 Cell = tuple[int, int]
 
 
-def least_cost(stand: Bools, sources: Ints, targets: Ints, *, side: int, diagonal: int) -> float:
+def least_cost(
+    traversable: Bools, sources: Ints, targets: Ints, *, side: int, diagonal: int
+) -> float:
     """Return the least source cost + way + target cost; inf if there is no way.
 
     The start is one more node, joined to the sources by what they cost, and so is the goal.
     """
-    padded = np.pad(stand, 1)
+    padded = np.pad(traversable, 1)
     start, goal = padded.size, padded.size + 1
     nodes = np.arange(padded.size).reshape(padded.shape)
     edges = []
@@ -37,29 +39,31 @@ def least_cost(stand: Bools, sources: Ints, targets: Ints, *, side: int, diagona
     return float(dijkstra(graph, indices=start)[goal])
 
 
-def stands(stand: Bools, cell: Cell) -> bool:
+def stands(traversable: Bools, cell: Cell) -> bool:
     """Whether a cell is on the grid, and stands."""
-    return all(0 <= i < n for i, n in zip(cell, stand.shape, strict=True)) and bool(stand[cell])
+    return all(0 <= i < n for i, n in zip(cell, traversable.shape, strict=True)) and bool(
+        traversable[cell]
+    )
 
 
-def may_step(stand: Bools, cell: Cell, step: Cell) -> bool:
+def may_step(traversable: Bools, cell: Cell, step: Cell) -> bool:
     """Whether all cells of the box that a step spans stand."""
     (row, col), (i, j) = cell, step
-    return all(stands(stand, (row + a, col + b)) for a in {0, i} for b in {0, j})
+    return all(stands(traversable, (row + a, col + b)) for a in {0, i} for b in {0, j})
 
 
-def jump(stand: Bools, cell: Cell, step: Cell) -> int:
+def jump(traversable: Bools, cell: Cell, step: Cell) -> int:
     """Return the jump from a cell, one step at a time: n to stop after n, -n to hit the wall."""
     n, (i, j) = 0, step
-    while may_step(stand, cell, step):
+    while may_step(traversable, cell, step):
         before, cell = cell, (cell[0] + i, cell[1] + j)
         n += 1
         if i and j:
-            if jump(stand, cell, (i, 0)) > 0 or jump(stand, cell, (0, j)) > 0:
+            if jump(traversable, cell, (i, 0)) > 0 or jump(traversable, cell, (0, j)) > 0:
                 return n
         elif any(
-            stands(stand, (cell[0] + a, cell[1] + b))
-            and not stands(stand, (before[0] + a, before[1] + b))
+            stands(traversable, (cell[0] + a, cell[1] + b))
+            and not stands(traversable, (before[0] + a, before[1] + b))
             for a, b in [(j, i), (-j, -i)]
         ):
             return n

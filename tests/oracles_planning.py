@@ -13,7 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from groundmap.arrays import Bools, Floats, Floats32
-from groundmap.grid import ConfidenceGrid
+from groundmap.grid.grid import ConfidenceGrid
 
 FREE, BLOCKED, UNSEEN = -1.0, 1.0, 0.0
 STEPS = [(i, j) for i, j in product((-1, 0, 1), repeat=2) if (i, j) != (0, 0)]

@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import dijkstra
 from groundmap.arrays import Bools, Floats, Ints
 from oracles_planning import BLOCKED, FREE, grid_of
 from planners import PlanningProblem
-from planners.costmap import Costmap
+from planners.costmap.costmap import Costmap
 
 
 def bitmaps(*, side: int = 8) -> st.SearchStrategy[Bools]:
@@ -32,19 +32,19 @@ def bitmaps(*, side: int = 8) -> st.SearchStrategy[Bools]:
 
 def noise(side: int, *, share: float, seed: int = 3) -> Bools:
     """Return cells of which a share can be stood on, and all near two opposite corners."""
-    stand: Bools = np.random.default_rng(seed).random((side, side)) < share
-    stand[:3, :3] = stand[-3:, -3:] = True
-    return stand
+    traversable: Bools = np.random.default_rng(seed).random((side, side)) < share
+    traversable[:3, :3] = traversable[-3:, -3:] = True
+    return traversable
 
 
-def costmap_of(stand: Bools) -> Costmap:
+def costmap_of(traversable: Bools) -> Costmap:
     """Return the costmap, with cells of a metre, of a point that can stand on these cells.
 
-    Cell (0, 0) of `stand` is the map's, and all beyond is unknown.
+    Cell (0, 0) of `traversable` is the map's, and all beyond is unknown.
     """
-    row, col = np.argwhere(stand)[0].tolist()
+    row, col = np.argwhere(traversable)[0].tolist()
     place = (col + 0.5, row + 0.5)
-    grid = grid_of(np.where(stand, FREE, BLOCKED))
+    grid = grid_of(np.where(traversable, FREE, BLOCKED))
     problem = PlanningProblem(grid, start=place, goal=place, footprint=0.0, clear_start=False)
     return Costmap.of(problem)
 
@@ -55,24 +55,28 @@ def centre(cell: npt.ArrayLike) -> tuple[float, float]:
     return col + 0.5, row + 0.5
 
 
-def full_squares(stand: Bools) -> Bools:
+def full_squares(traversable: Bools) -> Bools:
     """Return which squares between four cell centres belong to the region."""
-    full: Bools = stand[:-1, :-1] & stand[:-1, 1:] & stand[1:, :-1] & stand[1:, 1:]
+    full: Bools = (
+        traversable[:-1, :-1] & traversable[:-1, 1:] & traversable[1:, :-1] & traversable[1:, 1:]
+    )
     return full
 
 
-def region(stand: Bools) -> shapely.Geometry:
+def region(traversable: Bools) -> shapely.Geometry:
     """Return the region in which routes may run: squares and sides between cell centres.
 
     Cells beside which no other can be stood on are left out: from there, routes lead nowhere.
     """
-    rows, cols = np.nonzero(full_squares(stand))
+    rows, cols = np.nonzero(full_squares(traversable))
     squares = shapely.box(cols, rows, cols + 1.0, rows + 1.0)
     sides = [
         shapely.LineString([(c, r), (c + dc, r + dr)])
-        for r, c in np.argwhere(stand).tolist()
+        for r, c in np.argwhere(traversable).tolist()
         for dr, dc in ((0, 1), (1, 0))
-        if r + dr < len(stand) and c + dc < len(stand[0]) and stand[r + dr, c + dc]
+        if r + dr < len(traversable)
+        and c + dc < len(traversable[0])
+        and traversable[r + dr, c + dc]
     ]
     return shapely.union_all([*squares, *sides])
 
@@ -85,22 +89,22 @@ def sees(where: shapely.Geometry, points: Floats, pairs: Ints) -> Bools:
 
 
 def visibility_lengths(
-    stand: Bools, extra: npt.ArrayLike = (), *, margin: float = 0.0
+    traversable: Bools, extra: npt.ArrayLike = (), *, margin: float = 0.0
 ) -> tuple[Floats, Floats]:
     """Return points (x, y), and the lengths of the shortest lines between each two; inf: none.
 
     Parameters
     ----------
-    stand : ndarray of bool, shape (rows, cols)
+    traversable : ndarray of bool, shape (rows, cols)
     extra : array_like, shape (n, 2)
         Points (x, y) in the region that come after all its lattice points.
     margin : float
         How far lines may leave the region: what grazes a corner does, where points are rounded.
     """
-    lattice = np.argwhere(stand)[:, ::-1].astype(np.float64)
+    lattice = np.argwhere(traversable)[:, ::-1].astype(np.float64)
     points = np.concatenate([lattice, np.asarray(extra, dtype=np.float64).reshape(-1, 2)])
     pairs = np.array(list(combinations(range(len(points)), 2)), dtype=np.int64).reshape(-1, 2)
-    where = region(stand)
+    where = region(traversable)
     if margin > 0.0:
         where = shapely.buffer(where, margin, join_style="mitre")
     seen = pairs[sees(where, points, pairs)]

@@ -13,10 +13,10 @@ from scipy.spatial.transform import Rotation
 
 from groundmap import StereoRig, View
 from groundmap.arrays import Floats, Ints
-from groundmap.features import Features
-from groundmap.frames import T_REP103_OPTICAL
-from groundmap.ground import GroundPlane
-from groundmap.heights import FlatView
+from groundmap.evidence.ground_plane.height_classes import GroundView
+from groundmap.view.frames import T_REP103_OPTICAL
+from groundmap.view.ground_plane import GroundPlane
+from groundmap.view.view import Features
 
 
 def rngs() -> st.SearchStrategy[np.random.Generator]:
@@ -155,7 +155,7 @@ def flat_view(
     baseline: float = 0.0,
     viewpoint: tuple[float, float] = (0.0, 0.0),
     forward: tuple[float, float] = (1.0, 0.0),
-) -> FlatView:
+) -> GroundView:
     """Build a view by hand; a covariance is a variance in all directions, or matrices.
 
     Its images have no borders unless they are given.
@@ -169,7 +169,7 @@ def flat_view(
     feature = np.arange(len(xy) + len(ground))
     for a, b in np.asarray(segments, dtype=np.int64).reshape(-1, 2).tolist():
         feature[b] = feature[a]  # both ends are of one feature
-    return FlatView(
+    return GroundView(
         viewpoint=np.array(viewpoint),
         forward=np.array(forward),
         camera_height=camera_height,

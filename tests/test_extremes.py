@@ -19,8 +19,8 @@ from groundmap import (
     pose_jumps,
 )
 from groundmap.errors import CameraError, InputError, SettingsError
-from groundmap.frames import map_from_world
-from groundmap.triangulation import triangulate
+from groundmap.evidence.triangulation import triangulate
+from groundmap.view.frames import map_from_world
 
 RIG = StereoRig(fx=700.0, fy=700.0, cx=320.0, cy=240.0, baseline=0.5)
 HUGE = [1e200, -1e300, 1.7e308]

@@ -29,7 +29,7 @@ from planners import (
     plan,
 )
 from planners.incremental import IncrementalPlanner
-from planners.problem import Unknown
+from planners.problem.problem import Unknown
 
 SIDE = 16
 

@@ -25,10 +25,10 @@ from groundmap import (
 )
 from groundmap.arrays import Floats
 from groundmap.errors import GroundmapError, InputError, NoGroundPlaneError, SettingsError
-from groundmap.frames import T_REP103_OPTICAL, invert
-from groundmap.fusion import Average, Capped
-from groundmap.heights import flatten
-from groundmap.smoothing import smoothed
+from groundmap.evidence.ground_plane.height_classes import flatten
+from groundmap.evidence.ground_plane.ray_smoothing import smooth_features
+from groundmap.grid.fusion import Average, Capped
+from groundmap.view.frames import T_REP103_OPTICAL, invert
 
 HEIGHT = 1.5
 GROUND = GroundPlane(normal=np.array([0.0, 0.0, 1.0]), offset=0.0)
@@ -233,7 +233,7 @@ def test_explaining_a_view_changes_nothing() -> None:
     parts = mapper.explain(view)
     assert snapshot(mapper) == before
     mapper.integrate(view)
-    assert mapper.stats.features_used == before.stats["features_used"] + parts.flat.used
+    assert mapper.stats.features_used == before.stats["features_used"] + parts.ground_view.used
 
 
 def test_the_mapper_names_the_cells_that_a_view_changed() -> None:
@@ -254,15 +254,16 @@ def test_features_are_smoothed_before_they_are_linked() -> None:
     view = view_of(
         wall + rng.normal(0, 0.1, wall.shape) * (1, 0, 0), np.empty((0, 2, 3)), sigma=0.1
     )
-    raw, flat = (
-        GroundMapper(smoothing=width).explain(view).flat.points[:, 0] for width in (0.0, 0.25)
+    raw, ground_view = (
+        GroundMapper(smoothing=width).explain(view).ground_view.points[:, 0]
+        for width in (0.0, 0.25)
     )
     assert np.std(raw) > 0.08
-    assert np.std(flat) < np.std(raw) / 2
+    assert np.std(ground_view) < np.std(raw) / 2
     chosen = GroundMapper()
     npt.assert_array_equal(
-        chosen.explain(view).flat.points,
-        smoothed(flatten(view, chosen.settings), chosen.settings).points,
+        chosen.explain(view).ground_view.points,
+        smooth_features(flatten(view, chosen.settings), chosen.settings).points,
     )
 
 

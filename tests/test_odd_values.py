@@ -26,9 +26,9 @@ from groundmap import (
 from groundmap.arrays import as_number, is_number
 from groundmap.draw import draw_curves, draw_graph, draw_route, draw_trajectory, new_figure
 from groundmap.errors import CameraError, FileFormatError, InputError, SettingsError
-from groundmap.ground_fit import fit_ground
-from groundmap.simulate import DriveSettings, Hole, Solid, World, drive, strew
+from groundmap.simulate import DriveSettings, Hole, Solid, World, drive, sample_landmarks
 from groundmap.simulate.shapes import box, pole, wall
+from groundmap.view.ground_fit import fit_ground
 from planners import (
     Footprint,
     PlanningProblem,
@@ -221,7 +221,7 @@ def test_names_that_no_file_can_have_are_refused(name: str, tmp_path: Path) -> N
 def test_the_walls_of_holes_count_as_a_world_s_landmarks() -> None:
     world = World(bounds=(0, 0, 8, 8), holes=(Hole(shapely.box(5, 5, 6, 6), depth=1e9),))
     with pytest.raises(InputError, match=r"^world: expected 1e\+06 landmarks at most"):
-        strew(world, np.random.default_rng(1))
+        sample_landmarks(world, np.random.default_rng(1))
 
 
 @pytest.mark.parametrize("index", [1, (0.5, 0), (2**70, 0), ("a", "b"), (0, 0, 0), [(0, 0)]])

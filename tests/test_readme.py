@@ -14,7 +14,7 @@ import pytest
 from groundmap import fit_ground, read_views
 from planners import OWN_PLANNERS
 from planners.commands.app import app
-from planners.sampling.door import samplers
+from planners.sampling.ompl_module import samplers
 
 README = Path(__file__).parents[1] / "README.md"
 pytestmark = pytest.mark.skipif(not README.is_file(), reason="README.md is not beside the tests")

@@ -37,10 +37,10 @@ from random_problems import Attempt, Choice, all_planners, draw
 
 from groundmap.errors import SettingsError
 from planners import NoRouteError, ProblemError, plan
-from planners.bench.crew import crew
 from planners.bench.samplers import processors
+from planners.bench.worker_pool import worker_pool
 from planners.sampling import settings
-from planners.sampling.settings import Space
+from planners.sampling.settings import StateSpace
 
 GRACE = 0.5  # [s] by which an answer may come after the time limit
 REPEATS = 3  # of an attempt that is late, before that counts
@@ -123,14 +123,16 @@ def main() -> int:
     told = _arguments()
     choice = Choice(
         (told.planner,) if told.planner else all_planners(),
-        (told.space,) if told.space else get_args(Space),
+        (told.space,) if told.space else get_args(StateSpace),
         told.refused,
     )
     numbers = range(told.attempts) if told.only is None else [told.only]
     print(f"seed {told.seed}, {len(numbers)} attempts, {told.jobs} processes", flush=True)
     tasks = map(partial(Task, choice, told.seed), numbers)
     ends, most, began = Counter[str](), 0.0, time.perf_counter()
-    with closing(crew(tasks, tried, jobs=told.jobs, patience=told.patience, lost=_lost)) as results:
+    with closing(
+        worker_pool(tasks, tried, jobs=told.jobs, patience=told.patience, lost=_lost)
+    ) as results:
         for count, (task, ending) in enumerate(results, start=1):
             ends[ending.kind] += 1
             most = max(most, ending.over)
@@ -150,7 +152,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=secrets.randbelow(2**31))
     parser.add_argument("--jobs", type=int, default=processors())
     parser.add_argument("--planner", choices=all_planners())
-    parser.add_argument("--space", choices=get_args(Space))
+    parser.add_argument("--space", choices=get_args(StateSpace))
     parser.add_argument("--only", type=int, help="number of the one attempt to make")
     parser.add_argument("--patience", type=float, default=PATIENCE, help="for one attempt [s]")
     parser.add_argument("--refused", action="store_true", help="try what is refused, too")

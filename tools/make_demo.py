@@ -18,8 +18,6 @@ import shapely
 
 from groundmap import StereoRig, View
 from groundmap.arrays import Floats
-from groundmap.features import Features
-from groundmap.frames import to_quaternion
 from groundmap.io.columns import KINDS, LAYOUTS, Kind
 from groundmap.io.folder import ARCHIVE, POSES, RIG
 from groundmap.io.rig import write_rig
@@ -31,8 +29,10 @@ from groundmap.simulate import (
     World,
     drive,
     observe,
-    strew,
+    sample_landmarks,
 )
+from groundmap.view.frames import to_quaternion
+from groundmap.view.view import Features
 
 FOLDER = Path(__file__).parent.parent / "planners" / "demo_data"
 SEED = 20
@@ -105,7 +105,7 @@ def moves() -> Drive:
 
 def views() -> list[View]:
     """Return the views of the drive."""
-    landmarks = strew(COURTYARD, np.random.default_rng(SEED))
+    landmarks = sample_landmarks(COURTYARD, np.random.default_rng(SEED))
     return list(observe(COURTYARD, landmarks, moves(), SENSOR, seed=SEED))
 
 

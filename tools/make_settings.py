@@ -12,9 +12,9 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from planners import OWN_PLANNERS, SamplingSettings
-from planners.engine import SearchSettings
-from planners.sampling.door import has_parameter, samplers
+from planners.sampling.ompl_module import has_parameter, samplers
 from planners.sampling.settings import PARAMETERS, refusal
+from planners.search.base import SearchSettings
 
 FILE = Path(__file__).parents[1] / "docs" / "settings.md"
 HEAD = """# Settings of planners

@@ -11,12 +11,12 @@ from scipy import ndimage
 from groundmap import ConfidenceGrid
 from groundmap.arrays import Bools, Floats, Floats32
 from planners import PlanningProblem, SamplingSettings
-from planners.costs import CostSettings
-from planners.problem import Unknown
+from planners.problem.costs import CostSettings
+from planners.problem.problem import Unknown
 from planners.registry import OWN_PLANNERS
-from planners.sampling.door import has_parameter, samplers
 from planners.sampling.objectives import HEEDING
-from planners.sampling.settings import PARAMETERS, TURNING, Space, refusal
+from planners.sampling.ompl_module import has_parameter, samplers
+from planners.sampling.settings import PARAMETERS, TURNING, StateSpace, refusal
 
 RESOLUTIONS = (-2.0, 3.0)  # decimal logarithm of a cell's side [m]
 ORIGINS = (0.0, 7.0)  # decimal logarithm of the distance of the grid's origin [m]
@@ -41,7 +41,7 @@ class Choice(NamedTuple):
     """What is drawn from."""
 
     planners: tuple[str, ...]
-    spaces: tuple[Space, ...] = get_args(Space)
+    spaces: tuple[StateSpace, ...] = get_args(StateSpace)
     refused: bool = False  #: whether combinations are tried that are refused otherwise
 
 
@@ -54,7 +54,7 @@ def draw(choice: Choice, seed: int, number: int) -> Attempt:
     """Return one attempt: the same for the same seed and number."""
     rng = np.random.default_rng([seed, number])
     planner = str(rng.choice(choice.planners))
-    space: Space | None = None
+    space: StateSpace | None = None
     if planner in samplers():
         allowed = [s for s in choice.spaces if choice.refused or refusal(planner, s) is None]
         if not allowed:
@@ -192,7 +192,7 @@ def _turning_radius(rng: np.random.Generator, size: float) -> float:
 def _sampling(
     rng: np.random.Generator,
     planner: str,
-    space: Space,
+    space: StateSpace,
     *,
     places: Bools,
     size: float,

@@ -1,4 +1,4 @@
-"""Print how large the code is: per module its layer, lines, functions and public names."""
+"""Print how large the code is: rooms with their purpose, modules with layer, lines and names."""
 
 from __future__ import annotations
 
@@ -24,59 +24,90 @@ class Module(NamedTuple):
     public: list[str]
 
 
+class Room(NamedTuple):
+    """A package and the modules directly in it."""
+
+    name: str
+    purpose: str
+    modules: list[Module]
+
+
 def main() -> None:
-    """Print one table per package, and the longest functions of both."""
-    modules = {package: measure(package) for package in ("groundmap", "planners")}
-    for package, measured in modules.items():
-        print(f"{package:<24}{'layer':>6}{'lines':>7}{'functions':>11}  longest function")
-        for module in sorted(measured, key=lambda module: (-module.layer, module.name)):
-            length, longest = max(module.functions, default=(0, ""))
-            flag = f"  over {LARGE} lines" if module.lines > LARGE else ""
-            print(
-                f"  {module.name:<22}{module.layer:>6}{module.lines:>7}"
-                f"{len(module.functions):>11}  {length:>3} {longest}{flag}"
-            )
-            print(f"    {', '.join(module.public)}")
+    """Print one table per room, the sums, and the longest functions."""
+    rooms = [room for package in ("groundmap", "planners") for room in measure(package)]
+    for room in rooms:
+        print_room(room)
+    for package in ("groundmap", "planners"):
+        inside = [room for room in rooms if room.name.partition(".")[0] == package]
+        measured = [module for room in inside for module in room.modules]
         lines = [module.lines for module in measured]
         lengths = [length for module in measured for length, _ in module.functions]
         print(
-            f"  {len(lines)} modules, {sum(lines)} lines (median {median(lines or [0]):g}); "
-            f"{len(lengths)} functions (median {median(lengths or [0]):g} lines)\n"
+            f"{package}: {len(inside)} rooms, {len(lines)} modules, {sum(lines)} lines "
+            f"(median {median(lines or [0]):g}); {len(lengths)} functions "
+            f"(median {median(lengths or [0]):g} lines)"
         )
-    everything = [module for measured in modules.values() for module in measured]
-    for length, name in sorted((f for m in everything for f in m.functions), reverse=True)[
-        :LONGEST
-    ]:
+    functions = [f for room in rooms for module in room.modules for f in module.functions]
+    for length, name in sorted(functions, reverse=True)[:LONGEST]:
         print(f"{length:>5} {name}")
 
 
-def measure(package: str) -> list[Module]:
-    """Measure the modules of a package; its __init__, which only hands on names, is none."""
-    layers = layers_of(package)
-    modules = []
-    for path in sorted((ROOT / package).rglob("[!_]*.py")):
-        name = ".".join(path.relative_to(ROOT / package).with_suffix("").parts)
-        source = path.read_text(encoding="utf-8")
-        tree = ast.parse(source)
-        defined = [n.name for n in tree.body if isinstance(n, ast.FunctionDef | ast.ClassDef)]
-        functions = [
-            ((node.end_lineno or node.lineno) - node.lineno + 1, f"{package}.{name}.{node.name}")
-            for node in ast.walk(tree)
-            if isinstance(node, ast.FunctionDef)
-        ]
-        public = [name for name in defined if not name.startswith("_")]
-        layer = layers.get(name.partition(".")[0], 0)
-        modules.append(Module(name, layer, len(source.splitlines()), functions, public))
-    return modules
+def print_room(room: Room) -> None:
+    """Print a room's line, and a table of its modules."""
+    total = sum(module.lines for module in room.modules)
+    print(f"{room.name}  {len(room.modules)} modules, {total} lines. {room.purpose}")
+    for module in sorted(room.modules, key=lambda module: (-module.layer, module.name)):
+        length, longest = max(module.functions, default=(0, ""))
+        flag = f"  over {LARGE} lines" if module.lines > LARGE else ""
+        print(
+            f"  {module.name:<24}layer {module.layer:>2}{module.lines:>6} lines"
+            f"{len(module.functions):>4} functions, longest {length:>3} "
+            f"{longest.rpartition('.')[2]}{flag}"
+        )
+        print(f"    {', '.join(module.public)}")
+    print()
 
 
-def layers_of(package: str) -> dict[str, int]:
-    """Return the layer of each module, 1 the lowest, as the import contracts have them."""
+def measure(package: str) -> list[Room]:
+    """Measure a package room by room; an __init__, which only hands on names, is no module."""
+    layers = layers_by_module()
+    rooms = []
+    for init in sorted((ROOT / package).rglob("__init__.py")):
+        room = ".".join(init.parent.relative_to(ROOT).parts)
+        docstring = ast.get_docstring(ast.parse(init.read_text(encoding="utf-8"))) or ""
+        modules = [measure_module(path, room, layers) for path in init.parent.glob("[!_]*.py")]
+        rooms.append(Room(room, docstring.partition("\n\n")[0].replace("\n", " "), modules))
+    return rooms
+
+
+def measure_module(path: Path, room: str, layers: dict[str, int]) -> Module:
+    """Measure one file."""
+    name = f"{room}.{path.stem}"
+    source = path.read_text(encoding="utf-8")
+    tree = ast.parse(source)
+    defined = [n.name for n in tree.body if isinstance(n, ast.FunctionDef | ast.ClassDef)]
+    functions = [
+        ((node.end_lineno or node.lineno) - node.lineno + 1, f"{name}.{node.name}")
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef)
+    ]
+    public = [name for name in defined if not name.startswith("_")]
+    return Module(path.stem, layers.get(name, 0), len(source.splitlines()), functions, public)
+
+
+def layers_by_module() -> dict[str, int]:
+    """Return the layer of each module in its room, 1 the lowest, as the import contracts have it.
+
+    A module of a room without a contract of its own has none.
+    """
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    contracts = settings["tool"]["importlinter"]["contracts"]
-    (layers,) = [c["layers"] for c in contracts if c.get("containers") == [package]]
-    numbered = enumerate(reversed(layers), start=1)
-    return {name.strip(" ()"): number for number, row in numbered for name in row.split("|")}
+    layers = {}
+    for contract in settings["tool"]["importlinter"]["contracts"]:
+        for container in contract.get("containers", []):
+            for number, row in enumerate(reversed(contract["layers"]), start=1):
+                for name in row.split("|"):
+                    layers[f"{container}.{name.strip(' ()')}"] = number
+    return layers
 
 
 if __name__ == "__main__":

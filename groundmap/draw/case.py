@@ -14,8 +14,8 @@ from groundmap.draw.figure import add_to_legend
 from groundmap.draw.maps import draw_grid, draw_trajectory
 from groundmap.draw.routes import ROUTE, draw_route
 from groundmap.draw.truth import draw_difference, draw_truth
-from groundmap.grid import ConfidenceGrid
-from groundmap.window import GridWindow
+from groundmap.grid.grid import ConfidenceGrid
+from groundmap.grid.window import GridWindow
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.archive import check_writable, write_atomically
 from groundmap.arrays import as_floats, check_finite
 from groundmap.errors import InputError
+from groundmap.files.archive import check_writable, write_atomically
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -10,8 +10,8 @@ import numpy.typing as npt
 from groundmap.arrays import Floats, as_floats, as_number, check_finite
 from groundmap.draw.figure import add_to_legend, new_figure, scale_bar
 from groundmap.errors import InputError
-from groundmap.grid import ConfidenceGrid
-from groundmap.window import EPSILON, CellState, GridWindow
+from groundmap.grid.grid import ConfidenceGrid
+from groundmap.grid.window import EPSILON, CellState, GridWindow
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -91,7 +91,7 @@ def draw_grid(
     rows, cols = window.count.shape
     x, y = window.origin
     picture = ax.imshow(
-        _shaded(window, epsilon),
+        _shade(window, epsilon),
         origin="lower",
         extent=(x, x + cols * window.resolution, y, y + rows * window.resolution),
         interpolation="nearest",
@@ -168,7 +168,7 @@ def draw_verdicts(
     return artists
 
 
-def _shaded(window: GridWindow, epsilon: float) -> Floats:
+def _shade(window: GridWindow, epsilon: float) -> Floats:
     states = window.states(epsilon=epsilon)
     sure = np.abs(window.confidence).astype(np.float64)[..., None]
     image = np.zeros((*states.shape, 3))

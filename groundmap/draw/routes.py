@@ -112,8 +112,8 @@ def _footprints(
         swept = line.buffer(radius)
     else:
         corners = _points("footprint", footprint, least=3)
-        placed = _placed(corners, points, headings)
-        outlines = [Polygon(placed[k], fill=False, zorder=4) for k in _stamped(points)]
+        placed = _place(corners, points, headings)
+        outlines = [Polygon(placed[k], fill=False, zorder=4) for k in _select_stamps(points)]
         swept = shapely.union_all(shapely.polygons(placed))
     for outline in outlines:
         outline.set(edgecolor=ROUTE, linewidth=0.8)
@@ -125,7 +125,7 @@ def _footprints(
     return [*bands, *outlines]
 
 
-def _placed(corners: Floats, points: Floats, headings: npt.ArrayLike | None) -> Floats:
+def _place(corners: Floats, points: Floats, headings: npt.ArrayLike | None) -> Floats:
     """Return the corners at every waypoint, shape (n, m, 2) [m, map]."""
     turns = np.zeros(len(points))
     if headings is not None:
@@ -136,7 +136,7 @@ def _placed(corners: Floats, points: Floats, headings: npt.ArrayLike | None) -> 
     return np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1) + points[:, None]
 
 
-def _stamped(points: Floats) -> list[int]:
+def _select_stamps(points: Floats) -> list[int]:
     """Return the waypoints at which an outline is drawn."""
     along = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
     wanted = np.linspace(0.0, along[-1], _stamps(float(along[-1])))

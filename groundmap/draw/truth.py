@@ -16,7 +16,7 @@ from groundmap.arrays import Bools, Bytes, Floats, as_floats
 from groundmap.draw.figure import add_to_legend
 from groundmap.draw.maps import SHADES
 from groundmap.errors import InputError
-from groundmap.window import CellState
+from groundmap.grid.window import CellState
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

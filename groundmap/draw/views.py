@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from groundmap.arrays import Floats
-from groundmap.grid import ConfidenceGrid
+from groundmap.evidence.ground_plane.surfaces import SurfaceKind
+from groundmap.grid.grid import ConfidenceGrid
 from groundmap.mapper import ViewParts
-from groundmap.surfaces import SurfaceKind
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,29 +59,33 @@ def draw_view(parts: ViewParts, grid: ConfidenceGrid, *, title: str = "") -> Fig
 
 
 def _reach(parts: ViewParts) -> tuple[Floats, Floats]:
-    flat = parts.flat
-    places = np.concatenate([np.zeros((1, 2)), flat.points, flat.supports, flat.drop_offs])
+    ground_view = parts.ground_view
+    places = np.concatenate(
+        [np.zeros((1, 2)), ground_view.points, ground_view.supports, ground_view.drop_offs]
+    )
     return places.min(axis=0) - 1.0, places.max(axis=0) + 1.0
 
 
 def draw_features(parts: ViewParts, *, ax: Axes) -> None:
     """Draw obstacle features by height, ground features, and what lies below the ground."""
-    flat = parts.flat
+    ground_view = parts.ground_view
     points = ax.scatter(
-        flat.points[:, 0],
-        flat.points[:, 1],
-        c=flat.heights,
+        ground_view.points[:, 0],
+        ground_view.points[:, 1],
+        c=ground_view.heights,
         s=14,
         cmap="plasma_r",
         vmin=0.0,
         label="obstacles",
     )
     ax.figure.colorbar(points, ax=ax, label="height above ground [m]", shrink=0.7)
-    for a, b in flat.segments.tolist():
-        ax.plot(*flat.points[[a, b]].T, color="0.3", linewidth=1.0)
-    ax.plot(*flat.supports.T, ".", color=GROUND, markersize=4, label="ground")
-    ax.plot(*flat.drop_offs.T, "v", color=DROP_OFF, markersize=5, label="below ground")
-    dropped = ", ".join(f"{count} {reason}" for reason, count in sorted(flat.dropped.items()))
+    for a, b in ground_view.segments.tolist():
+        ax.plot(*ground_view.points[[a, b]].T, color="0.3", linewidth=1.0)
+    ax.plot(*ground_view.supports.T, ".", color=GROUND, markersize=4, label="ground")
+    ax.plot(*ground_view.drop_offs.T, "v", color=DROP_OFF, markersize=5, label="below ground")
+    dropped = ", ".join(
+        f"{count} {reason}" for reason, count in sorted(ground_view.dropped.items())
+    )
     ax.set_title(
         f"features by height; left out: {dropped.replace('_', ' ') or 'none'}", fontsize=10
     )

@@ -12,10 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from groundmap.arrays import Floats
-from groundmap.camera import StereoRig
 from groundmap.errors import FileFormatError
-from groundmap.features import Features, WrongCovariance, wrong_covariance
 from groundmap.io.rows import record
+from groundmap.view.stereo_rig import StereoRig
+from groundmap.view.view import Features, WrongCovariance, wrong_covariance
 
 Kind = Literal["points", "segments"]
 KINDS: tuple[Kind, ...] = ("points", "segments")

@@ -8,10 +8,10 @@ from typing import IO
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.archive import write_atomically
 from groundmap.errors import InputError
-from groundmap.grid import ConfidenceGrid
-from groundmap.window import GridWindow
+from groundmap.files.archive import write_atomically
+from groundmap.grid.grid import ConfidenceGrid
+from groundmap.grid.window import GridWindow
 
 
 def dense_window(grid: ConfidenceGrid, bounds: npt.ArrayLike | None = None) -> GridWindow:

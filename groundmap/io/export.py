@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy.typing as npt
 
 from groundmap.errors import InputError
-from groundmap.grid import ConfidenceGrid
+from groundmap.grid.grid import ConfidenceGrid
 from groundmap.io.dense import write_dense
 from groundmap.io.ros_map import write_ros_map
 

@@ -11,14 +11,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.array_files import read_arrays
 from groundmap.arrays import as_floats
-from groundmap.camera import StereoRig
 from groundmap.errors import FileFormatError, InputError
-from groundmap.features import Features
+from groundmap.files.array_files import read_arrays
 from groundmap.io.columns import KINDS, LARGEST_ID, LAYOUTS, Kind, Layout, find_layout
-from groundmap.io.rows import opened, read_rows
+from groundmap.io.rows import open_rows, read_rows
 from groundmap.io.view_order import first_wrong, split_by_view
+from groundmap.view.stereo_rig import StereoRig
+from groundmap.view.view import Features
 
 COVARIANCE = "a covariance that is "
 
@@ -52,7 +52,7 @@ class CsvTable(FeatureTable):
         self.path, self.there = path, path.exists()
         self.layout = LAYOUTS[kind][0]
         if self.there:
-            with opened(path) as stream:
+            with open_rows(path) as stream:
                 header = stream.readline().strip()
             names = tuple(name.strip() for name in header.split(",")) if header else ()
             self.layout = find_layout(path, kind, names)

@@ -26,13 +26,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from groundmap.errors import FileFormatError
-from groundmap.features import View
-from groundmap.frames import map_from_world
 from groundmap.io.columns import KINDS, Kind
 from groundmap.io.feature_tables import CsvTable, FeatureTable, read_npz
 from groundmap.io.log import ViewLog
 from groundmap.io.poses import poses_by_time, read_tum
 from groundmap.io.rig import read_rig
+from groundmap.view.frames import map_from_world
+from groundmap.view.view import View
 
 RIG, POSES, ARCHIVE = "rig.toml", "poses.txt", "features.npz"
 TABLES: dict[Kind, str] = {"points": "points.csv", "segments": "segments.csv"}

@@ -15,12 +15,12 @@ import numpy.typing as npt
 
 from groundmap.arrays import Floats
 from groundmap.errors import InputError
-from groundmap.features import Features, View
-from groundmap.files import check_name
-from groundmap.frames import to_quaternion
+from groundmap.files.opening import check_name
 from groundmap.io.columns import KINDS, LARGEST_ID, LAYOUTS, Kind, values_of
 from groundmap.io.folder import ARCHIVE, POSES, RIG, TABLES
 from groundmap.io.rig import rig_values, write_rig
+from groundmap.view.frames import to_quaternion
+from groundmap.view.view import Features, View
 
 OWN_FILES = {RIG, POSES, ARCHIVE, *TABLES.values()}
 

@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 
 from groundmap.errors import FileFormatError, InputError
-from groundmap.files import check_name
+from groundmap.files.opening import check_name
 from groundmap.io.folder import FolderLog
 from groundmap.io.gtsam import GtsamLog
 from groundmap.io.log import ViewLog
@@ -70,11 +70,11 @@ def read_views(
             hint = "Give the folder that holds it."
             raise FileFormatError(folder, "a folder of views", "a file", hint=hint)
         raise FileFormatError(folder, "a folder of views", "nothing of that name")
-    log = FORMATS[format] if format is not None else _recognised(folder)
+    log = FORMATS[format] if format is not None else _recognise(folder)
     return log(folder, poses=None if poses is None else Path(poses))
 
 
-def _recognised(folder: Path) -> type[ViewLog]:
+def _recognise(folder: Path) -> type[ViewLog]:
     for log in FORMATS.values():
         if log.recognises(folder):
             return log

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from PIL import Image, TiffImagePlugin
 
 from groundmap.errors import FileFormatError
-from groundmap.files import open_file
+from groundmap.files.opening import open_file
 
 FORMATS = ("BMP", "GIF", "JPEG", "PNG", "PPM", "TIFF", "WEBP")
 SIXTEEN_BITS = ("I;16", "I;16L", "I;16B", "I;16N")

@@ -19,14 +19,14 @@ import numpy as np
 import numpy.typing as npt
 
 from groundmap.arrays import Floats, Ints
-from groundmap.camera import StereoRig
 from groundmap.errors import FileFormatError, InputError
-from groundmap.features import View
-from groundmap.frames import map_from_world
 from groundmap.io.disk_sort import RowsByView
 from groundmap.io.log import ViewLog
 from groundmap.io.poses import check_unique, poses_by_id, read_gtsam
 from groundmap.io.rows import Rows, read_rows, record
+from groundmap.view.frames import map_from_world
+from groundmap.view.stereo_rig import StereoRig
+from groundmap.view.view import View
 
 CALIBRATION, POSES, FACTORS = (
     "VO_calibration.txt",

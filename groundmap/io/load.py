@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 
 from groundmap.errors import InputError
-from groundmap.grid import ConfidenceGrid
+from groundmap.grid.grid import ConfidenceGrid
 from groundmap.io.map_images import grid_of, image_of, read_ros_map
 from groundmap.io.movingai import read_movingai_map, read_movingai_voxels
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import ClassVar
 
-from groundmap.features import View
+from groundmap.view.view import View
 
 
 class ViewLog(ABC):

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from groundmap.arrays import Bools
-from groundmap.documents import read_yaml
 from groundmap.errors import FileFormatError
-from groundmap.grid import ConfidenceGrid
+from groundmap.files.documents import read_yaml
+from groundmap.grid.grid import ConfidenceGrid
 from groundmap.io.greys import read_greys
-from groundmap.printable import shown
+from groundmap.printable import format_value
 
 ROS_KEYS = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
 NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -116,7 +116,7 @@ def image_of(path: Path) -> Path:
 def _image(path: Path, keys: dict[str, Any]) -> str:
     name = keys["image"]
     if not isinstance(name, str) or not name:
-        raise FileFormatError(path, "the name of an image", shown(name))
+        raise FileFormatError(path, "the name of an image", format_value(name))
     return name
 
 
@@ -130,26 +130,26 @@ def _read_keys(path: Path) -> dict[str, Any]:
             raise FileFormatError(path, f"the key {key!r}", "none")
     mode = keys.get("mode", "trinary")
     if not isinstance(mode, str) or mode.lower() != "trinary":
-        raise FileFormatError(path, "mode trinary", shown(mode))
+        raise FileFormatError(path, "mode trinary", format_value(mode))
     return keys
 
 
 def _number(path: Path, text: Any, key: str) -> float:
     number = float(text) if isinstance(text, str) and NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(number):
-        raise FileFormatError(path, f"a number for {key!r}", shown(text))
+        raise FileFormatError(path, f"a number for {key!r}", format_value(text))
     return number
 
 
 def _negate(path: Path, text: Any) -> bool:
     if not isinstance(text, str) or text.lower() not in NEGATE:
-        raise FileFormatError(path, "negate 0 or 1", shown(text))
+        raise FileFormatError(path, "negate 0 or 1", format_value(text))
     return NEGATE[text.lower()]
 
 
 def _origin(path: Path, value: Any) -> tuple[float, float]:
     if not (isinstance(value, list) and len(value) == 3):
-        raise FileFormatError(path, "an origin of [x, y, yaw]", shown(value))
+        raise FileFormatError(path, "an origin of [x, y, yaw]", format_value(value))
     x, y, yaw = (_number(path, part, "origin") for part in value)
     if abs(math.remainder(yaw, math.tau)) > MOST_TURN:
         raise FileFormatError(path, "an origin of yaw 0", f"{yaw:g}", hint="Turn the image.")

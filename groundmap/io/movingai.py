@@ -10,7 +10,7 @@ import numpy as np
 
 from groundmap.errors import FileFormatError, InputError
 from groundmap.io.map_images import BlockedMap, BlockedVoxels
-from groundmap.io.rows import SHOWN_CHARACTERS, opened, read_rows, record
+from groundmap.io.rows import SHOWN_CHARACTERS, open_rows, read_rows, record
 
 PASSABLE, BLOCKED = ".GS", "@OTW"
 MOST_VOXELS = 2**26
@@ -40,7 +40,7 @@ def read_movingai_map(path: str | PathLike[str], *, resolution: float = 1.0) -> 
     """
     _check_resolution(resolution)
     path = Path(path)
-    with opened(path) as stream:
+    with open_rows(path) as stream:
         lines = [line.rstrip() for line in stream]
     first, rows, cols = _movingai_header(path, lines)
     while len(lines) > first and not lines[-1]:
@@ -98,7 +98,7 @@ def _check_resolution(resolution: float) -> None:
 
 def _voxel_header(path: Path) -> tuple[int, int, int]:
     """Return the size that the first line states: along x, y and z."""
-    with opened(path) as stream:
+    with open_rows(path) as stream:
         line = stream.readline().strip()
     key, *sides = line.split() or [""]
     if key != "voxel" or len(sides) != 3 or not all(map(str.isdecimal, sides)):

@@ -9,7 +9,7 @@ from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
 from groundmap.errors import FileFormatError
-from groundmap.io.rows import SHOWN_CHARACTERS, opened
+from groundmap.io.rows import SHOWN_CHARACTERS, open_rows
 
 MOST, MOST_DIGITS = 2**31, 20  # of a whole number
 COLUMNS = "bucket, map, width, height, start x, y, goal x, y, length"
@@ -59,7 +59,7 @@ def read_movingai_scen(path: str | PathLike[str]) -> list[MovingAIQuery]:
     ('arena.map', (11, 1), (12, 3), 2.41421, True)
     """
     path = Path(path)
-    with opened(path) as stream:
+    with open_rows(path) as stream:
         lines = ((number, line.strip()) for number, line in enumerate(stream, start=1))
         filled = ((number, line) for number, line in lines if line)
         _check_version(path, filled)

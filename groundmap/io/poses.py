@@ -19,8 +19,8 @@ import numpy.typing as npt
 
 from groundmap.arrays import Floats, Ints
 from groundmap.errors import FileFormatError, InputError
-from groundmap.frames import check_transform, from_quaternion
-from groundmap.io.rows import Rows, opened, read_rows, record
+from groundmap.io.rows import Rows, open_rows, read_rows, record
+from groundmap.view.frames import check_transform, from_quaternion
 
 TUM_ROW, GTSAM_ROW = record([], 8), record(["id"], 16)
 KITTI_COLUMNS = 12
@@ -80,7 +80,7 @@ def read_poses(path: Path) -> Poses:
 
 
 def _first_row(path: Path) -> list[str]:
-    with opened(path) as stream:
+    with open_rows(path) as stream:
         return next((text for line in stream if (text := line.partition("#")[0].split())), [])
 
 

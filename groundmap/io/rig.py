@@ -6,17 +6,17 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from groundmap.camera import StereoRig
-from groundmap.documents import read_toml
 from groundmap.errors import FileFormatError, InputError
-from groundmap.frames import World
+from groundmap.files.documents import read_toml
+from groundmap.view.frames import WorldConvention
+from groundmap.view.stereo_rig import StereoRig
 
 REQUIRED = ("world", "fx", "fy", "cx", "cy", "baseline")
 OPTIONAL = ("pixel_noise_px", "T_base_camera")
-WORLDS: tuple[World, ...] = ("optical", "rep103")
+WORLDS: tuple[WorldConvention, ...] = ("optical", "rep103")
 
 
-def read_rig(path: Path) -> tuple[StereoRig, World]:
+def read_rig(path: Path) -> tuple[StereoRig, WorldConvention]:
     """Read a rig and its world.
 
     Raises
@@ -52,7 +52,7 @@ def rig_values(rig: StereoRig) -> dict[str, Any]:
     }
 
 
-def write_rig(path: Path, rig: StereoRig, world: World) -> None:
+def write_rig(path: Path, rig: StereoRig, world: WorldConvention) -> None:
     """Write a rig and its world; every number is read back as it was."""
     # Python writes floats, and lists of them, the way TOML does.
     lines = [f'world = "{world}"', *(f"{key} = {value}" for key, value in rig_values(rig).items())]

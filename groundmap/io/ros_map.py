@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.archive import write_atomically
 from groundmap.arrays import Bytes
 from groundmap.errors import InputError
-from groundmap.grid import ConfidenceGrid
+from groundmap.files.archive import write_atomically
+from groundmap.grid.grid import ConfidenceGrid
+from groundmap.grid.window import CellState
 from groundmap.io.dense import dense_window
-from groundmap.window import CellState
 
 # Contested cells are unknown to a planner, here as everywhere.
 GREYS = {

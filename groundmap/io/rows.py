@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from groundmap.arrays import Ints
 from groundmap.errors import FileFormatError
-from groundmap.files import open_text, reason_of
+from groundmap.files.opening import open_text, reason_of
 
 CHUNK_LINES = 65_536
 SHOWN_CHARACTERS = 60
@@ -41,7 +41,7 @@ def record(integers: Sequence[str], numbers: int) -> np.dtype[Any]:
 
 
 @contextmanager
-def opened(path: str | PathLike[str]) -> Iterator[TextIO]:
+def open_rows(path: str | PathLike[str]) -> Iterator[TextIO]:
     """Open a text file, whatever bytes it holds; a byte order mark is passed over.
 
     Raises
@@ -81,7 +81,7 @@ def read_rows(
     FileFormatError
         A line with another number of columns, or one that is not a number.
     """
-    with opened(path) as stream:
+    with open_rows(path) as stream:
         first = 1
         if header:
             stream.readline()

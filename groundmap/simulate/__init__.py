@@ -1,7 +1,7 @@
 """Worlds that are known, and a stereo sensor that sees them: the ground truth that logs lack."""
 
 from groundmap.simulate.drive import Drive, DriveSettings, drive
-from groundmap.simulate.landmarks import Landmarks, strew
+from groundmap.simulate.landmarks import Landmarks, sample_landmarks
 from groundmap.simulate.observe import observe
 from groundmap.simulate.sensor import SensorSettings
 from groundmap.simulate.world import Hole, Solid, World
@@ -16,5 +16,5 @@ __all__ = [
     "World",
     "drive",
     "observe",
-    "strew",
+    "sample_landmarks",
 ]

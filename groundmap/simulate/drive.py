@@ -56,7 +56,7 @@ def drive(settings: DriveSettings, rng: np.random.Generator) -> Drive:
     8
     """
     poses = _along(settings)
-    logged = _drifted(poses, settings)
+    logged = _add_drift(poses, settings)
     noise = rng.normal(size=poses.shape)
     logged += noise * (settings.position_noise, settings.position_noise, settings.yaw_noise)
     times = settings.seconds_per_view * np.arange(len(poses), dtype=np.float64)
@@ -103,7 +103,7 @@ def _along(settings: DriveSettings) -> Floats:
     return np.concatenate([*poses, stops[-1:]])
 
 
-def _drifted(poses: Floats, settings: DriveSettings) -> Floats:
+def _add_drift(poses: Floats, settings: DriveSettings) -> Floats:
     """Chain the moves anew, each stretched and turned: what odometry does."""
     moves = np.diff(poses, axis=0)
     driven = np.cumsum([0.0, *np.hypot(moves[:, 0], moves[:, 1])])

@@ -19,7 +19,7 @@ MOST = 1e6  # landmarks of a world: more is a size or a density in the wrong uni
 SHORTEST, LONGEST = 0.3, 1.2  # [m], of a segment
 
 
-class Marks(NamedTuple):
+class LandmarkSet(NamedTuple):
     """Landmarks of one kind, where they are at time 0."""
 
     xyz: Floats  #: shape (n, 3) [m, map] of points, (n, 2, 3) of segments
@@ -32,8 +32,8 @@ class Marks(NamedTuple):
 class Landmarks(NamedTuple):
     """All landmarks of a world."""
 
-    points: Marks
-    segments: Marks
+    points: LandmarkSet
+    segments: LandmarkSet
 
 
 class _Face(NamedTuple):
@@ -48,7 +48,7 @@ class _Face(NamedTuple):
         return float(np.linalg.norm(self.along) * np.linalg.norm(self.up))
 
 
-def strew(world: World, rng: np.random.Generator) -> Landmarks:
+def sample_landmarks(world: World, rng: np.random.Generator) -> Landmarks:
     """Strew landmarks over a world, as densely as its solids and its ground say.
 
     Points fall on upright faces, on tops and on the ground, at random; segments likewise, and
@@ -68,7 +68,7 @@ def strew(world: World, rng: np.random.Generator) -> Landmarks:
     Examples
     --------
     >>> world = World(bounds=(0, 0, 10, 10), solids=(Solid(shapely.box(4, 4, 5, 5), top=1.0),))
-    >>> found = strew(world, np.random.default_rng(1))
+    >>> found = sample_landmarks(world, np.random.default_rng(1))
     >>> len(found.points), len(found.segments)
     (641, 8)
     """
@@ -97,13 +97,13 @@ def _check_number(world: World) -> None:
         )
 
 
-def _marks(parts: list[Floats]) -> Marks:
+def _marks(parts: list[Floats]) -> LandmarkSet:
     """Join the landmarks of the ground, which come first, and of each solid."""
     owners = np.repeat(np.arange(len(parts)) + GROUND, [len(part) for part in parts])
-    return Marks(np.concatenate(parts), owners)
+    return LandmarkSet(np.concatenate(parts), owners)
 
 
-def present_at(marks: Marks, world: World, time: float) -> tuple[Floats, Bools]:
+def present_at(marks: LandmarkSet, world: World, time: float) -> tuple[Floats, Bools]:
     """Return where landmarks are at a time [s], and which of them are there."""
     shifts = np.array([(0.0, 0.0), *(solid.shift(time) for solid in world.solids)])
     there = np.array([True, *(solid.is_there(time) for solid in world.solids)])

@@ -82,7 +82,7 @@ def match(
     return matched, found
 
 
-def broken(
+def break_segments(
     segments: Floats, settings: MatchingSettings, rng: np.random.Generator
 ) -> tuple[Floats, Ints]:
     """Break some segments in two, each with a gap of a tenth of it at a random place.

@@ -10,9 +10,9 @@ from scipy.ndimage import binary_dilation, distance_transform_edt
 from scipy.spatial import cKDTree
 
 from groundmap.arrays import Bools, Floats
-from groundmap.judge import NEAR, cells_around, near_nonfree
+from groundmap.evaluate.held_out import NEAR, cells_around, near_nonfree
+from groundmap.grid.window import CellState, GridWindow
 from groundmap.simulate.truth import HAIR, Truth
-from groundmap.window import CellState, GridWindow
 
 JUDGED_RANGE = 10.0  # [m], boundaries farther from every viewpoint are not judged
 

@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from groundmap.arrays import Bools, Floats, Ints
-from groundmap.features import View
 from groundmap.simulate.drive import Drive
-from groundmap.simulate.landmarks import Landmarks, Marks, present_at
-from groundmap.simulate.matching import broken, match
+from groundmap.simulate.landmarks import Landmarks, LandmarkSet, present_at
+from groundmap.simulate.matching import break_segments, match
 from groundmap.simulate.occlusion import in_sight
 from groundmap.simulate.sensor import SensorSettings
 from groundmap.simulate.world import World
+from groundmap.view.view import View
 
 PLACES = 9  # along a segment that are looked at, to find the piece of it in sight
 
@@ -35,7 +35,7 @@ def observe(
     ----------
     world : World
     landmarks : Landmarks
-        From `groundmap.simulate.landmarks.strew`.
+        From `groundmap.simulate.landmarks.sample_landmarks`.
     moves : Drive
     settings : SensorSettings
     seed : int
@@ -56,7 +56,7 @@ def observe(
         lines, lines_found = match(
             strokes.pixels, scene.periods(strokes, landmarks.segments), settings, rng
         )
-        pieces, row = broken(lines[lines_found], settings, rng)
+        pieces, row = break_segments(lines[lines_found], settings, rng)
         yield View.from_pixels(
             logged,
             settings.rig,
@@ -76,14 +76,14 @@ class _Scene:
         self.now = world.at(time)
         self.eye = (pose @ settings.rig.T_base_camera)[:3, 3]
 
-    def points(self, marks: Marks) -> _Seen:
+    def points(self, marks: LandmarkSet) -> _Seen:
         """Return the point landmarks in sight."""
         xyz, there = present_at(marks, self.world, self.time)
         pixels, seen = self._look(xyz, there)
         ids = np.flatnonzero(seen)
         return _Seen(pixels[ids, None], ids)
 
-    def segments(self, marks: Marks) -> _Seen:
+    def segments(self, marks: LandmarkSet) -> _Seen:
         """Return the segment landmarks in sight: of each, its longest piece that is."""
         xyz, there = present_at(marks, self.world, self.time)
         share = np.linspace(0.0, 1.0, PLACES)[:, None]
@@ -96,7 +96,7 @@ class _Scene:
         pixels, _ = self.settings.project(self.pose, visible.reshape(-1, 3))
         return _Seen(pixels.reshape(-1, 2, 3), ids)
 
-    def periods(self, seen: _Seen, marks: Marks) -> Floats:
+    def periods(self, seen: _Seen, marks: LandmarkSet) -> Floats:
         """Return how far apart the pieces of repeated patterns are in the images, (n,) [px].
 
         As if the pattern were seen face on; 0 where there is none.

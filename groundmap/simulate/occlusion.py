@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 
 from groundmap.arrays import Bools, Floats, Ints
-from groundmap.kernels.occlusion import hidden
+from groundmap.simulate.kernels.occlusion import find_hidden
 from groundmap.simulate.world import Hole, World
 
 GROUND_LEVEL = 0.0  # [m], where sight along the ground runs
@@ -53,10 +53,10 @@ def edges_of(outline: shapely.Geometry) -> Floats:
     return np.concatenate([np.empty((0, 4)), *pieces])
 
 
-def unhidden(prisms: Prisms, eye: Floats, targets: Floats) -> Bools:
+def find_visible(prisms: Prisms, eye: Floats, targets: Floats) -> Bools:
     """Return which targets, shape (n, 3) [m, map], no prism hides from the eye."""
     out = np.empty(len(targets), dtype=np.bool_)
-    hidden(np.ascontiguousarray(eye), np.ascontiguousarray(targets), *prisms, out)
+    find_hidden(np.ascontiguousarray(eye), np.ascontiguousarray(targets), *prisms, out)
     return ~out
 
 
@@ -65,7 +65,7 @@ def in_sight(world: World, eye: Floats, targets: Floats) -> Bools:
 
     The world is at rest. Targets below the ground are seen through the mouth of their hole.
     """
-    seen = unhidden(opaque_prisms(world), eye, targets)
+    seen = find_visible(opaque_prisms(world), eye, targets)
     below = np.flatnonzero(seen & (targets[:, 2] < 0))
     seen[below] = _through_mouths(world.holes, eye, targets[below])
     return seen

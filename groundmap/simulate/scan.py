@@ -10,15 +10,15 @@ from pydantic import Field
 
 from groundmap.arrays import Floats
 from groundmap.errors import InputError
-from groundmap.features import Features, View
-from groundmap.frames import invert
-from groundmap.kernels.occlusion import first_hits
 from groundmap.settings import MapperSettings, Settings
 from groundmap.simulate.drive import Drive
+from groundmap.simulate.kernels.occlusion import first_hits
 from groundmap.simulate.occlusion import edges_of
 from groundmap.simulate.sensor import SensorSettings
 from groundmap.simulate.truth import in_images, seen_along_ground
 from groundmap.simulate.world import World
+from groundmap.view.frames import invert
+from groundmap.view.view import Features, View
 
 MOST = 5e6  # features of a view
 SIGMA = 1e-6  # [m], of every feature

@@ -8,9 +8,9 @@ import numpy as np
 from pydantic import Field
 
 from groundmap.arrays import Bools, Floats
-from groundmap.camera import StereoRig
-from groundmap.frames import T_REP103_OPTICAL, invert
 from groundmap.simulate.matching import MatchingSettings
+from groundmap.view.frames import T_REP103_OPTICAL, invert
+from groundmap.view.stereo_rig import StereoRig
 
 NEAREST = 0.2  # [m], depth: what is nearer is out of focus
 

@@ -9,18 +9,18 @@ import shapely
 from scipy.ndimage import binary_dilation
 
 from groundmap.arrays import Bools, Floats
+from groundmap.grid.window import GridWindow, cells_of, centres_of
 from groundmap.settings import MapperSettings
 from groundmap.simulate.drive import Drive
 from groundmap.simulate.occlusion import (
     GROUND_LEVEL,
     Prisms,
     edges_of,
+    find_visible,
     ground_level_prisms,
-    unhidden,
 )
 from groundmap.simulate.sensor import SensorSettings
 from groundmap.simulate.world import World
-from groundmap.window import GridWindow, cells_of, centres_of
 
 HAIR = 1e-6  # [m], surfaces are looked at from this far before them; a cell touched by less is free
 SAME_PLACE = 1e-3  # [m], a surface seen this near to where one is at the end was that one
@@ -152,7 +152,7 @@ def _clear(prisms: Prisms, eye: Floats, places: Floats, rows: Bools) -> Bools:
     """Return which places among `rows` nothing hides, along the ground."""
     clear = np.zeros(len(places), dtype=np.bool_)
     targets = np.column_stack([places[rows], np.full(rows.sum(), GROUND_LEVEL)])
-    clear[rows] = unhidden(prisms, np.array([*eye, GROUND_LEVEL]), targets)
+    clear[rows] = find_visible(prisms, np.array([*eye, GROUND_LEVEL]), targets)
     return clear
 
 

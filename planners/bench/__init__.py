@@ -1,1 +1,1 @@
-"""How fast planners are, and whether they find what others published."""
+"""Benchmarks: how fast planners are, and whether they find published lengths."""

@@ -15,12 +15,12 @@ from groundmap.arrays import Floats
 from groundmap.errors import InputError
 from groundmap.io import load_map
 from groundmap.io.load import LOADERS
-from planners.bench.worlds import Case, Cases
-from planners.costmap import Costmap
+from planners.bench.benchmark_problems import Case, Cases
+from planners.costmap.costmap import Costmap
+from planners.costmap.voxel_map import Voxels
 from planners.errors import ProblemError
-from planners.footprint import Footprint
-from planners.problem import PlanningProblem
-from planners.voxels import Voxels
+from planners.problem.footprint import Footprint
+from planners.problem.problem import PlanningProblem
 
 TRIES = 64  # places, of which the two are taken that are farthest apart
 SEED = 0  # of the places
@@ -56,7 +56,7 @@ def cases_on(map_file: Path, footprint: Any, *, turning_radius: float) -> Cases:
         The footprint fits nowhere.
     """
     grid, shape = load_map(map_file), Footprint.of(footprint)
-    problem = _posed(grid, shape if grid.ndim == 2 else Footprint.of(shape.radius))
+    problem = _make_problem(grid, shape if grid.ndim == 2 else Footprint.of(shape.radius))
     if grid.ndim == 3:
         return {"r3": Case(problem, {})}
     curve = {"turning_radius": turning_radius}
@@ -68,7 +68,7 @@ def cases_on(map_file: Path, footprint: Any, *, turning_radius: float) -> Cases:
     }
 
 
-def _posed(grid: ConfidenceGrid, footprint: Footprint) -> PlanningProblem:
+def _make_problem(grid: ConfidenceGrid, footprint: Footprint) -> PlanningProblem:
     """Return a problem between two places far apart."""
     low, high = np.split(grid.bounds(), 2)
     centre = tuple(((low + high) / 2.0).tolist())
@@ -82,7 +82,7 @@ def _posed(grid: ConfidenceGrid, footprint: Footprint) -> PlanningProblem:
 
 def _far_apart(space: Costmap | Voxels) -> tuple[Floats, Floats]:
     """Return the centres of two cells of the largest region of places for the footprint."""
-    regions, count = ndimage.label(space.stand)
+    regions, count = ndimage.label(space.traversable)
     if count == 0:
         needed = f"a place for a footprint of radius {space.radius:.2f} m"
         raise ProblemError("map", needed, "none on the whole of it")

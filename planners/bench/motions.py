@@ -17,14 +17,13 @@ import numpy as np
 
 from groundmap import ConfidenceGrid
 from groundmap.arrays import Bools, Floats
-from planners.costmap import Costmap
-from planners.engine import Pose
+from planners.costmap.costmap import Costmap
 from planners.errors import ProblemError
-from planners.problem import PlanningProblem
-from planners.sampling.door import logged, ompl
-from planners.sampling.settings import SamplingSettings, Space
-from planners.sampling.states import edge_check, information_of, reader, space_of, state_of
-from planners.sampling.ways import Bounds, Ways
+from planners.problem.problem import PlanningProblem, Pose
+from planners.sampling.motion_validator import Bounds, MotionValidator
+from planners.sampling.ompl_module import ompl, redirect_log
+from planners.sampling.ompl_states import edge_check, information_of, reader, space_of, state_of
+from planners.sampling.settings import SamplingSettings, StateSpace
 
 POINTS = 40  # on an outline, that the lambda looks at
 MOST = 5000  # edges of a search that are asked again
@@ -34,10 +33,10 @@ EXACT = "EXACT_SOLUTION"
 COMPILED, LAMBDA, REACH = "compiled", "lambda", "compiled, own range"
 
 
-class Query(NamedTuple):
+class MotionQuery(NamedTuple):
     """Where from, where to, and what OMPL samples."""
 
-    ways: Ways
+    validator: MotionValidator
     start: Pose  #: as a state
     goal: Pose
     room: Bounds
@@ -62,7 +61,7 @@ def compare_motions(
 
     The space is "r2" for a radius and "se2" for an outline. Rows of the workload "motions" are
     about edges that RRT-Connect asked for, all asked again; those of "first route" about the whole
-    of RRT-Connect, with OMPL's range for edges and, at last, with that of `Ways.reach`.
+    of RRT-Connect, with OMPL's range for edges and, at last, with that of `MotionValidator.reach`.
 
     Parameters
     ----------
@@ -89,11 +88,12 @@ def compare_motions(
     """
     asked = _possible(grid, footprint, queries)
     runs = [(query, seed) for query in asked for seed in range(seeds)]
-    with logged():
+    with redirect_log():
         lists = [_edges_of(query, seed, time_limit) for query, seed in runs]
         motions = {
             system: [
-                _timed(query, system, edges) for (query, _), edges in zip(runs, lists, strict=True)
+                _time_checks(query, system, edges)
+                for (query, _), edges in zip(runs, lists, strict=True)
             ]
             for system in (LAMBDA, COMPILED)
         }
@@ -101,11 +101,11 @@ def compare_motions(
             system: [_first(query, system, seed, time_limit) for query, seed in runs]
             for system in (LAMBDA, COMPILED, REACH)
         }
-    space = asked[0].ways.space
+    space = asked[0].validator.space
     return [*_motion_rows(space, motions), *_route_rows(space, routes)]
 
 
-def _motion_rows(space: Space, motions: dict[str, list[Any]]) -> Iterator[dict[str, Any]]:
+def _motion_rows(space: StateSpace, motions: dict[str, list[Any]]) -> Iterator[dict[str, Any]]:
     """Yield a row per check."""
     answers = {name: np.concatenate([a for _, a in found]) for name, found in motions.items()}
     agree = float(np.mean(answers[LAMBDA] == answers[COMPILED]))
@@ -122,7 +122,7 @@ def _motion_rows(space: Space, motions: dict[str, list[Any]]) -> Iterator[dict[s
         }
 
 
-def _route_rows(space: Space, routes: dict[str, list[Search]]) -> Iterator[dict[str, Any]]:
+def _route_rows(space: StateSpace, routes: dict[str, list[Search]]) -> Iterator[dict[str, Any]]:
     """Yield a row per check and range."""
     times = {name: [search.seconds for search in found] for name, found in routes.items()}
     for name, found in routes.items():
@@ -142,75 +142,79 @@ def _spread(seconds: list[float]) -> dict[str, float]:
     return {"median_ms": float(median), "p95_ms": float(high)}
 
 
-def _possible(grid: ConfidenceGrid, footprint: Any, queries: Sequence[Any]) -> list[Query]:
+def _possible(grid: ConfidenceGrid, footprint: Any, queries: Sequence[Any]) -> list[MotionQuery]:
     """Return the queries that may have a route."""
-    found, ways = [], None
+    found, validator = [], None
     for start, goal in queries:
-        if ways is None:
+        if validator is None:
             problem = PlanningProblem(
                 grid, start=start, goal=goal, footprint=footprint, clear_start=False
             )
-            ways = Ways(Costmap.of(problem), "r2" if problem.shape.is_disc else "se2", 1.0)
-        ends = ways.state_of(start), ways.state_of(goal)
-        if all(ways.is_clear(*end, *end) for end in ends):
-            room = ways.room(*ends)
+            validator = MotionValidator(
+                Costmap.of(problem), "r2" if problem.shape.is_disc else "se2", 1.0
+            )
+        ends = validator.state_of(start), validator.state_of(goal)
+        if all(validator.is_clear(*end, *end) for end in ends):
+            room = validator.room(*ends)
             if room is not None:
-                found.append(Query(ways, *ends, room))
+                found.append(MotionQuery(validator, *ends, room))
     if not found:
         raise ProblemError("queries", "one that may have a route", "none")
     return found
 
 
-def _information(query: Query, system: str, edges: list[tuple[Pose, Pose]] | None = None) -> Any:
+def _information(
+    query: MotionQuery, system: str, edges: list[tuple[Pose, Pose]] | None = None
+) -> Any:
     """Return OMPL's space with one of the checks; what is asked is appended to `edges`."""
-    base, ways = ompl().base, query.ways
-    space = space_of(base, ways.space, query.room, SamplingSettings())
+    base, validator = ompl().base, query.validator
+    space = space_of(base, validator.space, query.room, SamplingSettings())
     if system == LAMBDA:
         information = base.SpaceInformation(space)
-        information.setStateValidityChecker(lambda_of(ways))
-        _set_steps(space, ways)
+        information.setStateValidityChecker(lambda_of(validator))
+        _set_steps(space, validator)
         information.setup()
         return information
-    check = edge_check(ways, count(1), lambda: None)
+    check = edge_check(validator, count(1), lambda: None)
     if edges is not None:
-        check = _recording(check, reader(ways.space), edges)
+        check = _recording(check, reader(validator.space), edges)
     return information_of(base, space, check)
 
 
 def _recording(check: Callable[..., bool], read: Any, edges: list[Any]) -> Callable[..., bool]:
-    def recording(validator: Any, a: Any, b: Any, _: Any = None) -> bool:
+    def recording(ompl_validator: Any, a: Any, b: Any, _: Any = None) -> bool:
         if len(edges) < MOST:
             edges.append((read(a), read(b)))
-        return check(validator, a, b)
+        return check(ompl_validator, a, b)
 
     return recording
 
 
-def _set_steps(space: Any, ways: Ways) -> None:
+def _set_steps(space: Any, validator: MotionValidator) -> None:
     """Have OMPL look at states that are a cell apart, or at which the outline has turned by one."""
-    size = ways.costmap.window.resolution
-    plane = space if ways.space == "r2" else space.getSubspace(0)
+    size = validator.costmap.window.resolution
+    plane = space if validator.space == "r2" else space.getSubspace(0)
     plane.setLongestValidSegmentFraction(STEP * size / plane.getMaximumExtent())
-    if ways.space != "r2":
-        turn = STEP * size / ways.costmap.problem.shape.radius
+    if validator.space != "r2":
+        turn = STEP * size / validator.costmap.problem.shape.radius
         yaw = space.getSubspace(1)
         yaw.setLongestValidSegmentFraction(min(turn / yaw.getMaximumExtent(), 1.0))
 
 
-def lambda_of(ways: Ways) -> Callable[[Any], bool]:
+def lambda_of(validator: MotionValidator) -> Callable[[Any], bool]:
     """Return what tells in Python whether a state of OMPL's is clear.
 
     In "r2" it looks up the state's cell: whether the footprint's centre may be on the cell's. In
     "se2" it looks up the cells of points on the outline.
     """
-    size = ways.costmap.window.resolution
-    if ways.space == "r2":
-        blocked = ~ways.costmap.stand
+    size = validator.costmap.window.resolution
+    if validator.space == "r2":
+        blocked = ~validator.costmap.traversable
         return lambda state: not blocked[int(state[1] / size), int(state[0] / size)]
-    points = _outline(ways) / size
+    points = _outline(validator) / size
     across, along = points.T
     margin = math.ceil(float(np.hypot(across, along).max())) + 1  # it may reach off the map
-    padded: Bools = np.pad(ways.costmap.blocked, margin, constant_values=True)
+    padded: Bools = np.pad(validator.costmap.blocked, margin, constant_values=True)
 
     def is_valid(state: Any) -> bool:
         cosine, sine = math.cos(state.getYaw()), math.sin(state.getYaw())
@@ -221,9 +225,9 @@ def lambda_of(ways: Ways) -> Callable[[Any], bool]:
     return is_valid
 
 
-def _outline(ways: Ways) -> Floats:
+def _outline(validator: MotionValidator) -> Floats:
     """Return about 40 points on the outline, evenly spread along its sides [m, base_link]."""
-    corners = np.asarray(ways.costmap.problem.shape.polygon)
+    corners = np.asarray(validator.costmap.problem.shape.polygon)
     closed = np.concatenate([corners, corners[:1]])
     spacing = np.hypot(*np.diff(closed, axis=0).T).sum() / POINTS
     sides = []
@@ -233,9 +237,11 @@ def _outline(ways: Ways) -> Floats:
     return np.concatenate(sides)
 
 
-def _searched(query: Query, information: Any, *, seed: int, longest: float, limit: float) -> Search:
+def _search(
+    query: MotionQuery, information: Any, *, seed: int, longest: float, limit: float
+) -> Search:
     """Have RRT-Connect search; `longest` is of an edge [m], 0 for OMPL's own."""
-    modules, kind = ompl(), query.ways.space
+    modules, kind = ompl(), query.validator.space
     modules.util.RNG.setSeed(seed + 1)  # 0 is refused
     space = information.getStateSpace()
     task = modules.base.ProblemDefinition(information)
@@ -255,23 +261,25 @@ def _searched(query: Query, information: Any, *, seed: int, longest: float, limi
     return Search(seconds, status.getStatus().name == EXACT)
 
 
-def _edges_of(query: Query, seed: int, limit: float) -> list[tuple[Pose, Pose]]:
+def _edges_of(query: MotionQuery, seed: int, limit: float) -> list[tuple[Pose, Pose]]:
     """Return the edges that a search asks for, the first thousands of them."""
     edges: list[tuple[Pose, Pose]] = []
-    _searched(query, _information(query, COMPILED, edges), seed=seed, longest=0.0, limit=limit)
+    _search(query, _information(query, COMPILED, edges), seed=seed, longest=0.0, limit=limit)
     return edges
 
 
-def _first(query: Query, system: str, seed: int, limit: float) -> Search:
+def _first(query: MotionQuery, system: str, seed: int, limit: float) -> Search:
     """Search with one of the checks."""
-    ways = query.ways
-    longest = ways.reach(ways.region(query.start), query.room) if system == REACH else 0.0
-    return _searched(query, _information(query, system), seed=seed, longest=longest, limit=limit)
+    validator = query.validator
+    longest = validator.reach(validator.region(query.start), query.room) if system == REACH else 0.0
+    return _search(query, _information(query, system), seed=seed, longest=longest, limit=limit)
 
 
-def _timed(query: Query, system: str, edges: Sequence[tuple[Pose, Pose]]) -> tuple[float, Bools]:
+def _time_checks(
+    query: MotionQuery, system: str, edges: Sequence[tuple[Pose, Pose]]
+) -> tuple[float, Bools]:
     """Return how long it takes to check edges through OMPL [s], and what came of each."""
-    information, kind = _information(query, system), query.ways.space
+    information, kind = _information(query, system), query.validator.space
     space = information.getStateSpace()
     pairs = [(state_of(space, a, kind), state_of(space, b, kind)) for a, b in edges]
     check = information.checkMotion

@@ -13,7 +13,7 @@ from groundmap.errors import FileFormatError, InputError
 from groundmap.io.map_images import BlockedMap, BlockedVoxels
 from groundmap.io.movingai import read_movingai_map, read_movingai_voxels
 from groundmap.io.movingai_scen import MovingAIQuery, read_movingai_scen
-from planners.bench.arena import Answer, Arena, warm_up
+from planners.bench.benchmark_runner import BenchmarkAnswer, BenchmarkRunner, warm_up
 
 SUFFIXES = {".scen", ".3dscen"}
 
@@ -27,12 +27,12 @@ class Workload(NamedTuple):
     queries: list[MovingAIQuery]
 
 
-class Result(NamedTuple):
+class WorkloadResult(NamedTuple):
     """A planner's answers to a workload."""
 
     workload: Workload
     setup_ms: float  #: from the map's grid to a planner that can be asked
-    answers: list[Answer]
+    answers: list[BenchmarkAnswer]
 
 
 def find_workloads(path: Path, *, limit: int | None = None) -> list[Workload]:
@@ -68,7 +68,7 @@ def run(
     planner: str,
     *,
     watch: Callable[[list[Any]], Iterable[Any]] = lambda steps: steps,
-) -> list[Result]:
+) -> list[WorkloadResult]:
     """Return a planner's answers: on each map an engine of its own, asked time and again.
 
     Parameters
@@ -89,14 +89,14 @@ def run(
     workloads = list(workloads)
     for dimensions in {len(work.queries[0].start) for work in workloads}:
         warm_up(planner, dimensions)
-    results: list[Result] = []
-    arena: Arena | None = None
+    results: list[WorkloadResult] = []
+    runner: BenchmarkRunner | None = None
     asked = [(work, query) for work in workloads for query in work.queries]
     for work, query in watch(asked):
-        if arena is None or results[-1].workload is not work:
-            arena = Arena(read_map(work), planner)
-            results.append(Result(work, arena.setup_ms, []))
-        results[-1].answers.append(arena.ask(query))
+        if runner is None or results[-1].workload is not work:
+            runner = BenchmarkRunner(read_map(work), planner)
+            results.append(WorkloadResult(work, runner.setup_ms, []))
+        results[-1].answers.append(runner.ask(query))
     return results
 
 

@@ -12,14 +12,14 @@ from typing import Any, NamedTuple, get_args
 import numpy as np
 
 from groundmap.arrays import Floats
-from planners.bench.crew import crew
-from planners.bench.trials import Attempt, Trial, Workload, attempted, lost, shortest
-from planners.sampling.settings import Space, refusal
+from planners.bench.trials import Attempt, Trial, Workload, lost_attempt, make_attempt, shortest
+from planners.bench.worker_pool import worker_pool
+from planners.sampling.settings import StateSpace, refusal
 
-SPACES: tuple[Space, ...] = get_args(Space)
+SPACES: tuple[StateSpace, ...] = get_args(StateSpace)
 PATIENCE = 120.0  # [s] beyond the time limit, for what is made and compiled before
 MOMENTS = 80  # points of a curve, at most
-ROUNDING = 1e-9  # relative, of costs
+COST_TOLERANCE = 1e-9  # relative, of costs
 FINDS = 3  # what everybody may tell: a route as it was found, as it was checked, and simplified
 
 
@@ -27,7 +27,7 @@ class Refused(NamedTuple):
     """What is not tried, and why."""
 
     planner: str
-    space: Space
+    space: StateSpace
     reason: str
 
 
@@ -35,15 +35,15 @@ class Race(NamedTuple):
     """All attempts of one planner at a workload in a space."""
 
     work: str
-    space: Space
+    space: StateSpace
     planner: str
     attempts: list[Attempt]
 
 
-def entered(
+def list_trials(
     works: Sequence[Workload],
     planners: Sequence[str],
-    spaces: Sequence[Space],
+    spaces: Sequence[StateSpace],
     *,
     seeds: int,
     time_limit: float,
@@ -79,11 +79,13 @@ def run(
 
     A planner that crashes or hangs ends its process and loses the trial; the others go on.
     """
-    races: dict[tuple[Workload, Space, str], Race] = {}
+    races: dict[tuple[Workload, StateSpace, str], Race] = {}
     for work, space, planner, *_ in trials:
         races.setdefault((work, space, planner), Race(work.name, space, planner, []))
     patience = PATIENCE + max((trial.time_limit for trial in trials), default=0.0)
-    with closing(crew(trials, attempted, jobs=jobs, patience=patience, lost=lost)) as results:
+    with closing(
+        worker_pool(trials, make_attempt, jobs=jobs, patience=patience, lost=lost_attempt)
+    ) as results:
         for trial, attempt in watch(results):
             races[trial[:3]].attempts.append(attempt)
     return list(races.values())
@@ -96,9 +98,11 @@ class Optimum(NamedTuple):
     is_best_known: bool  #: whether it is only the best that anybody in the run came by
 
 
-def optima(works: Sequence[Workload], races: Sequence[Race]) -> dict[tuple[str, Space], Optimum]:
+def optima(
+    works: Sequence[Workload], races: Sequence[Race]
+) -> dict[tuple[str, StateSpace], Optimum]:
     """Return for each workload and space the least cost: in "r2" of the best route at any angle."""
-    found: dict[tuple[str, Space], Optimum] = {}
+    found: dict[tuple[str, StateSpace], Optimum] = {}
     by_name = {work.name: work for work in works}
     for name, space in dict.fromkeys((race.work, race.space) for race in races):
         costs = [
@@ -110,7 +114,7 @@ def optima(works: Sequence[Workload], races: Sequence[Race]) -> dict[tuple[str, 
         ]
         known = shortest(by_name[name].cases()[space]) if space == "r2" else None
         best = min(costs, default=None)
-        if known is not None and (best is None or known <= best * (1.0 + ROUNDING)):
+        if known is not None and (best is None or known <= best * (1.0 + COST_TOLERANCE)):
             found[name, space] = Optimum(known, is_best_known=False)
         else:
             found[name, space] = Optimum(best, is_best_known=True)

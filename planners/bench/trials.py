@@ -10,14 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from groundmap.io.map_images import BlockedMap, BlockedVoxels, grid_of
+from planners.bench.benchmark_problems import WORKLOADS, Case, Cases, rectangle
 from planners.bench.maps import cases_on
-from planners.bench.worlds import WORKLOADS, Case, Cases, rectangle
-from planners.engine import Improvement
 from planners.errors import AuditError, NoRouteError
-from planners.problem import PlanningProblem
-from planners.registry import plan
-from planners.sampling.settings import Space
-from planners.shortcuts import shortcut
+from planners.planning import plan
+from planners.problem.problem import PlanningProblem
+from planners.route.shortcut import shortcut
+from planners.sampling.settings import StateSpace
+from planners.search.base import Improvement
 
 
 class Workload(NamedTuple):
@@ -44,7 +44,7 @@ class Trial(NamedTuple):
     """What is tried: a planner in a space, with one seed."""
 
     work: Workload
-    space: Space
+    space: StateSpace
     planner: str
     seed: int
     time_limit: float  #: [s]
@@ -74,7 +74,7 @@ class Attempt(NamedTuple):
         return self.betters[-1][1]
 
 
-def attempted(trial: Trial) -> Attempt:
+def make_attempt(trial: Trial) -> Attempt:
     """Return what comes of a trial; what it needs is made and compiled before its time begins."""
     case = trial.work.cases()[trial.space]
     _warm_up(trial.planner, trial.space)
@@ -89,7 +89,7 @@ def attempted(trial: Trial) -> Attempt:
 
 
 def run_once(
-    case: Case, planner: str, space: Space, *, seed: int, time_limit: float, improve_for: float
+    case: Case, planner: str, space: StateSpace, *, seed: int, time_limit: float, improve_for: float
 ) -> Attempt:
     """Plan once, and note each betterment as it comes."""
     betters: list[tuple[float, float]] = []
@@ -115,7 +115,7 @@ def run_once(
     return Attempt(time.perf_counter() - began, tuple(betters))
 
 
-def lost(trial: Trial, reason: str) -> Attempt:
+def lost_attempt(trial: Trial, reason: str) -> Attempt:
     """Return what comes of a trial whose process ended."""
     return Attempt(trial.time_limit, reason=reason)
 
@@ -134,7 +134,7 @@ def shortest(case: Case) -> float | None:
 
 
 @cache
-def _warm_up(planner: str, space: Space) -> None:
+def _warm_up(planner: str, space: StateSpace) -> None:
     """Have all compiled and loaded that a planner needs in a space, once in a process."""
     free = np.zeros((18, 18) if space != "r3" else (18, 18, 18), dtype=np.bool_)
     if space == "r3":

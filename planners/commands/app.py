@@ -13,6 +13,7 @@ from typer.exceptions import TyperException
 from groundmap.errors import GroundmapError
 from groundmap.printable import printable
 from planners.commands.bench import bench_app
+from planners.commands.console import say
 from planners.commands.convert import convert_command
 from planners.commands.demo import demo_command
 from planners.commands.evaluate import evaluate_command
@@ -21,7 +22,6 @@ from planners.commands.map import map_command
 from planners.commands.plan import plan_command
 from planners.commands.plot import plot_command
 from planners.commands.scenario import scenario_app
-from planners.console import say
 from planners.errors import AuditError, NoRouteError, PlanningError
 
 DONE, MISSED, BAD_INPUT, NO_ROUTE, INTERRUPTED = 0, 1, 2, 3, 130

@@ -8,12 +8,12 @@ from typing import Annotated, Any
 
 import typer
 
-from planners.bench.arena import ANY_ANGLE, figures
-from planners.bench.movingai import Result, find_workloads, run
-from planners.bench.worlds import WORKLOADS
+from planners.bench.benchmark_problems import WORKLOADS
+from planners.bench.benchmark_runner import ANY_ANGLE, figures
+from planners.bench.movingai import WorkloadResult, find_workloads, run
 from planners.commands.bench_motions import motions_command
 from planners.commands.bench_samplers import Entry, race_samplers
-from planners.console import JsonOption, emit, emit_rows, say, watched
+from planners.commands.console import JsonOption, emit, emit_rows, say, show_progress
 
 MISMATCH = 1  # exit code
 COLUMNS = ("queries", "solved", "mismatches", "median_ms", "p95_ms", "setup_ms")
@@ -150,7 +150,7 @@ def _put_queries(movingai: Path, planner: str, limit: int | None, *, as_json: bo
     workloads = find_workloads(movingai, limit=limit)
 
     def watch(steps: list[Any]) -> Any:
-        return watched(steps, total=len(steps), what=f"{planner}: queries")
+        return show_progress(steps, total=len(steps), what=f"{planner}: queries")
 
     results = run(workloads, planner, watch=watch)
     total = figures([answer for result in results for answer in result.answers])
@@ -167,7 +167,7 @@ def _put_queries(movingai: Path, planner: str, limit: int | None, *, as_json: bo
         raise typer.Exit(MISMATCH)
 
 
-def _row(result: Result, planner: str) -> dict[str, Any]:
+def _row(result: WorkloadResult, planner: str) -> dict[str, Any]:
     return {
         "workload": result.workload.name,
         "system": planner,
@@ -176,7 +176,7 @@ def _row(result: Result, planner: str) -> dict[str, Any]:
     }
 
 
-def _print_table(results: list[Result], total: dict[str, Any], planner: str) -> None:
+def _print_table(results: list[WorkloadResult], total: dict[str, Any], planner: str) -> None:
     """Print a line for each map, and one for all."""
     rows = {result.workload.name: _row(result, planner) for result in results}
     rows["all"] = {**total, "setup_ms": sum(row["setup_ms"] for row in rows.values())}
@@ -186,7 +186,7 @@ def _print_table(results: list[Result], total: dict[str, Any], planner: str) -> 
         print(f"{planner} may cut short: only routes longer than published are mismatches")
 
 
-def _say_mismatches(results: list[Result]) -> None:
+def _say_mismatches(results: list[WorkloadResult]) -> None:
     wrong = [
         (result.workload.scen, answer)
         for result in results

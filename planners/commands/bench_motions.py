@@ -12,10 +12,10 @@ from groundmap.io.map_images import BlockedMap, grid_of
 from groundmap.io.movingai_scen import MovingAIQuery
 from planners.bench.motions import compare_motions
 from planners.bench.movingai import find_workloads, read_map
+from planners.commands.console import JsonOption, emit, emit_rows, patiently
 from planners.commands.options import outline
-from planners.console import JsonOption, emit, emit_rows, patiently
-from planners.engine import Pose
 from planners.errors import ProblemError
+from planners.problem.problem import Pose
 
 
 def motions_command(

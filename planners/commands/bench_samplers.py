@@ -6,31 +6,20 @@ import time
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from groundmap.draw.anytime import Panel, Progress, anytime_figure
 from groundmap.draw.figure import check_picture, save_figure
+from planners.bench.benchmark_problems import CART, WORKLOADS
 from planners.bench.maps import find_maps
-from planners.bench.samplers import (
-    SPACES,
-    Refused,
-    entered,
-    optima,
-    processors,
-    row,
-    run,
-)
+from planners.bench.samplers import SPACES, Refused, list_trials, optima, processors, row, run
 from planners.bench.trials import Workload
-from planners.bench.worlds import CART, WORKLOADS
+from planners.commands.console import emit, emit_rows, show_progress
 from planners.commands.options import outline
-from planners.console import emit, emit_rows, watched
 from planners.errors import ProblemError
-from planners.footprint import Footprint
-from planners.registry import named
-from planners.sampling.door import samplers
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from planners.problem.footprint import Footprint
+from planners.registry import get_planner
+from planners.sampling.ompl_module import samplers
 
 COLUMNS = ("solved", "first_ms", "first_p95_ms", "median_ms", "cost", "ratio")
 
@@ -59,7 +48,7 @@ def race_samplers(entry: Entry, *, as_json: bool) -> None:
     names = _known("planner", entry.planners, _samplers())
     spaces = [space for space in SPACES if space in _known("space", entry.spaces, SPACES)]
     works = _works(entry)
-    trials, refused = entered(
+    trials, refused = list_trials(
         works,
         names,
         spaces,
@@ -69,7 +58,7 @@ def race_samplers(entry: Entry, *, as_json: bool) -> None:
     )
 
     def watch(steps: Iterable[Any]) -> Iterable[Any]:
-        return watched(steps, total=len(trials), what="attempts")
+        return show_progress(steps, total=len(trials), what="attempts")
 
     races = run(trials, jobs=entry.jobs or processors(), watch=watch)
     best = optima(works, races)
@@ -89,7 +78,7 @@ def race_samplers(entry: Entry, *, as_json: bool) -> None:
 def _samplers() -> list[str]:
     found = sorted(samplers())
     if not found:
-        named("rrtconnect")  # says how to install them
+        get_planner("rrtconnect")  # says how to install them
     return found
 
 
@@ -132,7 +121,7 @@ def _groups(rows: list[dict[str, Any]]) -> dict[tuple[str, str], list[dict[str, 
     return groups
 
 
-def _figure(rows: list[dict[str, Any]]) -> Figure:
+def _figure(rows: list[dict[str, Any]]) -> Any:
     """Return a picture with a row of panels for each workload."""
     groups = _groups(rows)
     panels = [

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from groundmap.archive import check_writable
+from groundmap.files.archive import check_writable
 from groundmap.io import export, files_of, files_written, load_map
-from planners.console import JsonOption, emit, numbers
+from planners.commands.console import JsonOption, emit, numbers
 
 
 def convert_command(

@@ -11,13 +11,13 @@ from typing import Annotated, Any
 import typer
 
 from groundmap import CellState, GroundMapper, fit_ground, read_views
-from groundmap.archive import check_writable
 from groundmap.errors import FileFormatError
+from groundmap.files.archive import check_writable
+from planners.commands.console import JsonOption, emit, show_progress
 from planners.commands.plot import draw_map
-from planners.console import JsonOption, emit, watched
-from planners.problem import PlanningProblem
-from planners.registry import plan
-from planners.route import Route
+from planners.planning import plan
+from planners.problem.problem import PlanningProblem
+from planners.route.route import Route
 
 GOAL = (20.5, 2.5)  # [m, map], behind the doorway and the skip
 FOOTPRINT = 0.35  # [m]
@@ -53,7 +53,7 @@ def map_courtyard() -> GroundMapper:
     mapper = GroundMapper()
     with as_file(files("planners") / "demo_data") as folder:
         log = read_views(folder)
-        for view in watched(fit_ground(log), total=len(log), what="mapping views"):
+        for view in show_progress(fit_ground(log), total=len(log), what="mapping views"):
             mapper.integrate(view)
     return mapper
 

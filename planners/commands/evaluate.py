@@ -9,9 +9,9 @@ from typing import Annotated, Any
 import typer
 
 from groundmap import draw, read_views
-from groundmap.evaluate import Verdict, evaluate
+from groundmap.evaluate.protocols import Verdict, evaluate
+from planners.commands.console import JsonOption, emit, emit_columns, show_progress
 from planners.commands.settings_file import ConfigOption, read_settings
-from planners.console import JsonOption, emit, emit_columns, watched
 
 
 def evaluate_command(
@@ -35,7 +35,7 @@ def evaluate_command(
     log = read_views(source, poses=poses)
 
     def watch(steps: list[Any]) -> Any:
-        return watched(steps, total=len(steps), what="mapping and judging")
+        return show_progress(steps, total=len(steps), what="mapping and judging")
 
     settings = read_settings(config)
     verdicts = evaluate(

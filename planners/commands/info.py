@@ -9,7 +9,7 @@ import typer
 
 from groundmap import CellState
 from groundmap.io import load_map
-from planners.console import JsonOption, emit
+from planners.commands.console import JsonOption, emit
 
 
 def info_command(

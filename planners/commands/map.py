@@ -8,15 +8,15 @@ from typing import Annotated, Any
 import typer
 
 from groundmap import CellState, GroundMapper, View, fit_ground, pose_jumps, read_views
-from groundmap.archive import check_writable
 from groundmap.arrays import Floats
-from groundmap.diagnosis import SAMPLE, describe_dropped, likely_mistakes
 from groundmap.errors import InputError
-from groundmap.jumps import Jump
+from groundmap.files.archive import check_writable
 from groundmap.mapper import warm_up
-from groundmap.stages import Stages
+from groundmap.stopwatch import Stopwatch
+from groundmap.view.diagnosis import SAMPLE, describe_dropped, likely_mistakes
+from groundmap.view.jumps import Jump
+from planners.commands.console import JsonOption, emit, say, seconds_since_start, show_progress
 from planners.commands.settings_file import ConfigOption, read_settings
-from planners.console import JsonOption, emit, say, seconds_since_start, watched
 
 SHOWN_JUMPS = 5  # of the poses, one line each
 NOT_MAPPING = {"startup", "read", "compile", "save", "other"}
@@ -51,7 +51,7 @@ def map_command(
     as_json: JsonOption = False,
 ) -> None:
     """Map a log of views into a confidence grid."""
-    stages = Stages(outside="other")
+    stages = Stopwatch(outside="other")
     stages.seconds["startup"] = seconds_since_start()
     check_writable(out)
     tables = read_settings(config)
@@ -63,9 +63,9 @@ def map_command(
     }
     chosen = tables["mapper"] | {key: value for key, value in given.items() if value is not None}
     mapper = GroundMapper(stages=stages, **chosen)
-    with stages.timed("compile"):
+    with stages.measure("compile"):
         warm_up(mapper.settings)
-    with stages.timed("read"):
+    with stages.measure("read"):
         log = read_views(source, format=format, poses=poses)
         total = len(log)
     if total == 0:
@@ -74,7 +74,7 @@ def map_command(
     sample: list[View] = []
     positions: list[Floats] = []
     times: list[float | None] = []
-    for view in watched(stages.each("ground", views), total=total, what="mapping views"):
+    for view in show_progress(stages.each("ground", views), total=total, what="mapping views"):
         mapper.integrate(view)
         positions.append(view.T_map_base[:3, 3])
         times.append(view.timestamp)
@@ -84,7 +84,7 @@ def map_command(
     warnings = _warnings(mapper, sample) + _jump_warnings(jumps)
     for warning in warnings:
         say(f"warning: {warning}")
-    with stages.timed("save"):
+    with stages.measure("save"):
         mapper.grid.save(out)
     summary = _summary(mapper, jumps, stages, out) | {"warnings": warnings}
     emit(summary, as_json=as_json, title=f"map of {source}")
@@ -125,7 +125,9 @@ def _jump_warnings(jumps: list[Jump]) -> list[str]:
     return warnings
 
 
-def _summary(mapper: GroundMapper, jumps: list[Jump], stages: Stages, out: Path) -> dict[str, Any]:
+def _summary(
+    mapper: GroundMapper, jumps: list[Jump], stages: Stopwatch, out: Path
+) -> dict[str, Any]:
     grid, stats = mapper.grid, mapper.stats
     area = {state: grid.area(state) for state in (CellState.FREE, CellState.NONFREE)}
     seconds = stages.stop()

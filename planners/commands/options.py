@@ -6,8 +6,8 @@ from typing import Any
 
 import typer
 
-from groundmap.documents import WrongDocumentError, parse_json
-from planners.console import numbers
+from groundmap.files.documents import WrongDocumentError, parse_json
+from planners.commands.console import numbers
 
 
 def outline(text: str) -> float | list[tuple[float, ...]]:
@@ -53,7 +53,7 @@ def assignments(texts: list[str]) -> dict[str, Any]:
     return settings
 
 
-def _listed(text: str) -> Any:
+def _parse_list(text: str) -> Any:
     """Return a list, as JSON has it."""
     try:
         return parse_json(text)
@@ -67,7 +67,7 @@ def _value(text: str) -> Any:
     if text.lower() == "none":
         return None
     if text.startswith("["):
-        return _listed(text)
+        return _parse_list(text)
     try:
         return float(text)
     except ValueError:

@@ -8,20 +8,21 @@ from typing import Annotated, cast
 import numpy as np
 import typer
 
-from groundmap.archive import check_writable
 from groundmap.draw import check_picture, known_bounds
+from groundmap.files.archive import check_writable
 from groundmap.io import files_of, load_map
 from groundmap.io.map_images import BlockedMap, grid_of
+from planners.commands.console import JsonOption, emit, emit_rows, numbers, patiently, show_progress
 from planners.commands.options import assignments, outline
 from planners.commands.plot import check_flat, draw_map
-from planners.console import JsonOption, emit, emit_rows, numbers, patiently, watched
-from planners.costs import CostSettings
 from planners.errors import NoRouteError, ProblemError
-from planners.problem import PLAIN, PlanningProblem, Unknown
-from planners.registry import OWN_PLANNERS, named, plan
-from planners.route import Route, check_route_file
-from planners.shortcuts import shortcut
-from planners.smoother import smooth
+from planners.planning import plan
+from planners.problem.costs import CostSettings
+from planners.problem.problem import PLAIN, PlanningProblem, Unknown
+from planners.registry import OWN_PLANNERS, get_planner
+from planners.route.route import Route, check_route_file
+from planners.route.shortcut import shortcut
+from planners.route.smooth import smooth
 
 ALL = "all"  # instead of a planner's name
 COLUMNS = ("length", "cost", "bound", "min_clearance", "mean_clearance", "min_confidence",
@@ -139,7 +140,7 @@ def plan_command(
         return
     with patiently("planning; what was never used before is compiled now"):
         chosen = {"time_limit": time_limit, **assignments(settings or [])}
-        named(planner).settings(**chosen)  # a name that `plan` takes itself is no setting
+        get_planner(planner).settings(**chosen)  # a name that `plan` takes itself is no setting
         route = plan(problem, planner, **chosen)
         graph = route.graph
         if turning_radius is not None:
@@ -168,7 +169,7 @@ def _compare(
     refused: dict[str, str] = {}
     failures: list[NoRouteError | ProblemError] = []
     names = sorted(OWN_PLANNERS)
-    for name in watched(names, total=len(names), what="planners"):
+    for name in show_progress(names, total=len(names), what="planners"):
         _warm_up(name)  # the table's seconds are those of planning, not of compiling
         try:
             routes[name] = plan(problem, name, time_limit=time_limit)

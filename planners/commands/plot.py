@@ -13,12 +13,12 @@ import typer
 
 from groundmap import ConfidenceGrid, GroundMapper, draw, fit_ground, read_views
 from groundmap.arrays import Floats, as_floats, check_finite
-from groundmap.documents import read_json
 from groundmap.errors import FileFormatError, InputError
+from groundmap.files.documents import read_json
 from groundmap.io import files_of, load_map
+from planners.commands.console import JsonOption, emit, numbers
 from planners.commands.settings_file import ConfigOption, read_settings
-from planners.console import JsonOption, emit, numbers
-from planners.sampling.graph import Graph
+from planners.search.graph import Graph
 
 
 def plot_command(

@@ -11,19 +11,19 @@ from typing import Annotated
 
 import typer
 
-from groundmap.archive import check_writable
 from groundmap.errors import GroundmapError
+from groundmap.files.archive import check_writable
 from groundmap.simulate.worlds import GENERATORS
-from planners.bench.crew import crew
-from planners.console import JsonOption, emit, watched
+from planners.bench.worker_pool import worker_pool
+from planners.commands.console import JsonOption, emit, show_progress
 from planners.errors import PlanningError
 from planners.scenario.case import find_scenarios, load_scenario
 from planners.scenario.outcome import Outcome
+from planners.scenario.recall_section import why_one_triangulates
 from planners.scenario.report import write_report
 from planners.scenario.run import run_scenario
 from planners.scenario.table import print_table
 from planners.scenario.template import write_template
-from planners.scenario.why import why_one_triangulates
 
 BOUND_MISSED = 1  # exit code
 
@@ -53,7 +53,7 @@ def run_command(
     paths = find_scenarios(folders or [Path("scenarios")])
     for path in paths:  # a typing mistake in the last one should not show after minutes
         load_scenario(path)
-    found = dict(watched(_run(paths, jobs), total=len(paths), what="running scenarios"))
+    found = dict(show_progress(_run(paths, jobs), total=len(paths), what="running scenarios"))
     outcomes = [found[path] for path in paths]
     if report is not None:
         write_report(report, outcomes, sections=[why_one_triangulates()])
@@ -93,7 +93,9 @@ def _run(paths: list[Path], jobs: int) -> Iterator[tuple[Path, Outcome]]:
         for path in paths:
             yield path, run_scenario(path)
         return
-    workers = crew(paths, _outcome, jobs=min(jobs, len(paths)), patience=math.inf, lost=_lost)
+    workers = worker_pool(
+        paths, _outcome, jobs=min(jobs, len(paths)), patience=math.inf, lost=_lost
+    )
     with closing(workers):
         for path, outcome in workers:
             if not isinstance(outcome, Outcome):

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from groundmap.documents import read_toml
 from groundmap.errors import SettingsError
+from groundmap.files.documents import read_toml
 from groundmap.settings import GroundSettings, MapperSettings
 
 TABLES = {"mapper": MapperSettings, "ground": GroundSettings}

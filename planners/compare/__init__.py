@@ -1,1 +1,1 @@
-"""Peers: other ways from views to a map, and what they reach on the same views."""
+"""Other ways from views to a map, on the same views."""

@@ -8,11 +8,12 @@ import numpy as np
 
 from groundmap import GroundMapper, View
 from groundmap.arrays import Floats, Ints
-from groundmap.evidence import Evidence, drop_off_cells
-from groundmap.grid import ConfidenceGrid
-from groundmap.heights import FlatView, flatten
+from groundmap.evidence.evidence import Evidence
+from groundmap.evidence.ground_plane.height_classes import GroundView, flatten
+from groundmap.evidence.ground_plane.rasterised import drop_off_cells
+from groundmap.grid.grid import ConfidenceGrid
 from groundmap.settings import MapperSettings
-from planners.kernels.raycast import cast_rays
+from planners.compare.kernels.raycast import cast_rays
 
 FREE, NONFREE = np.float32(-1.0), np.float32(1.0)
 
@@ -46,20 +47,22 @@ class RayCaster:
         NoGroundPlaneError
             The view has no plane, or its camera looks at the ground or the sky.
         """
-        flat = flatten(view, self.settings)
-        evidence = rays_of(flat, self.grid)
+        ground_view = flatten(view, self.settings)
+        evidence = rays_of(ground_view, self.grid)
         self.grid.fuse(evidence.lower, evidence.z)
-        self.grid.add_drop_offs(drop_off_cells(flat, self.grid))
+        self.grid.add_drop_offs(drop_off_cells(ground_view, self.grid))
 
 
-def rays_of(flat: FlatView, grid: ConfidenceGrid) -> Evidence:
+def rays_of(ground_view: GroundView, grid: ConfidenceGrid) -> Evidence:
     """Draw the rays of one view into cells: one z per cell, non-free before free.
 
     The cells from the camera to a feature are free (-1), its own included; that of an obstacle
     feature is non-free (+1), whatever passes through. Of a segment the two ends count.
     """
-    origin = _cells(flat, grid, np.zeros((1, 2)))
-    obstacles, grounds = (_cells(flat, grid, xy) for xy in (flat.points, flat.supports))
+    origin = _cells(ground_view, grid, np.zeros((1, 2)))
+    obstacles, grounds = (
+        _cells(ground_view, grid, xy) for xy in (ground_view.points, ground_view.supports)
+    )
     ends = np.concatenate([obstacles, grounds])
     lower = _floor(np.concatenate([origin, ends])).min(axis=0)
     upper = _floor(np.concatenate([origin, ends])).max(axis=0)
@@ -70,11 +73,11 @@ def rays_of(flat: FlatView, grid: ConfidenceGrid) -> Evidence:
     return Evidence(lower[::-1], z)
 
 
-def _cells(flat: FlatView, grid: ConfidenceGrid, xy: Floats) -> Floats:
+def _cells(ground_view: GroundView, grid: ConfidenceGrid, xy: Floats) -> Floats:
     """Carry places over from the frame ``view`` to cells (x along columns), unrounded."""
-    cos, sin = flat.forward
+    cos, sin = ground_view.forward
     to_map = np.array([(cos, -sin), (sin, cos)])
-    cells: Floats = (flat.viewpoint + xy @ to_map.T - grid.origin) / grid.resolution
+    cells: Floats = (ground_view.viewpoint + xy @ to_map.T - grid.origin) / grid.resolution
     return cells
 
 

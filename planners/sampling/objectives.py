@@ -12,14 +12,12 @@ import numpy as np
 
 from groundmap.arrays import Floats
 from groundmap.errors import SettingsError
-from planners.costmap import Costmap
-from planners.costs import MAX_NON_OBSTACLE
-from planners.engine import Pose
+from planners.costmap.costmap import Costmap
+from planners.costmap.swept_footprint import shape_of
 from planners.errors import ProblemError
-from planners.hybrid_parts import shape_of
-from planners.kernels.sampling import ARM, BULGE
-from planners.kernels.sampling import TURNING as TURNING_RADIUS
-from planners.kernels.sampling_costs import (
+from planners.problem.costs import MAX_NON_OBSTACLE
+from planners.problem.problem import Pose
+from planners.sampling.kernels.edge_costs import (
     COST,
     DRIVE,
     LENGTH,
@@ -29,10 +27,12 @@ from planners.kernels.sampling_costs import (
     line_cost,
     slide_cost,
 )
-from planners.sampling.settings import FLAT, TURNING, SamplingSettings, Space
-from planners.sampling.states import Glance, reader
-from planners.sampling.ways import Ways
-from planners.sampling.ways3d import Ways3D
+from planners.sampling.kernels.edges import ARM, BULGE
+from planners.sampling.kernels.edges import TURNING as TURNING_RADIUS
+from planners.sampling.motion_validator import MotionValidator
+from planners.sampling.motion_validator3d import MotionValidator3D
+from planners.sampling.ompl_states import Glance, reader
+from planners.sampling.settings import FLAT, TURNING, SamplingSettings, StateSpace
 
 # Planners that compare costs while they search. OMPL doesn't tell: the others take an objective,
 # too, and never ask it. PRM and PRM* would, from a thread of their own, which waits for Python's
@@ -52,7 +52,7 @@ class Objective:
 
     Parameters
     ----------
-    ways : Ways or Ways3D
+    validator : MotionValidator or MotionValidator3D
         On a 3-D map, all metres cost the same.
     settings : SamplingSettings
 
@@ -87,18 +87,18 @@ class Objective:
     Examples
     --------
     >>> from groundmap import ConfidenceGrid
-    >>> from planners.costmap import Costmap
-    >>> from planners.costs import CostSettings
-    >>> from planners.problem import PlanningProblem
+    >>> from planners.costmap.costmap import Costmap
+    >>> from planners.problem.costs import CostSettings
+    >>> from planners.problem.problem import PlanningProblem
     >>> grid = ConfidenceGrid(resolution=0.5)
     >>> field = np.full((64, 64), -1.0, dtype=np.float32)
     >>> field[:32] = -0.5
     >>> grid.fuse(np.array([0, 0]), field)
     >>> costs = CostSettings(confidence_weight=2.0)
     >>> problem = PlanningProblem(grid, start=(4, 4), goal=(30, 4), footprint=0.9, costs=costs)
-    >>> ways = Ways(Costmap.of(problem), "r2", 1.0)
-    >>> objective = Objective(ways, SamplingSettings())
-    >>> states = [ways.state_of(xy) for xy in ((4, 12), (10, 12), (10, 20))]
+    >>> validator = MotionValidator(Costmap.of(problem), "r2", 1.0)
+    >>> objective = Objective(validator, SamplingSettings())
+    >>> states = [validator.state_of(xy) for xy in ((4, 12), (10, 12), (10, 20))]
     >>> objective.cost(states[:2]), objective.cost(states), objective.is_native
     (12.0, 24.0, False)
     """
@@ -106,9 +106,11 @@ class Objective:
     edge: Callable[..., float]
     least: Callable[..., float]
 
-    def __init__(self, ways: Ways | Ways3D, settings: SamplingSettings) -> None:
-        self.space: Space = ways.space
-        costmap = ways.costmap if isinstance(ways, Ways) else None
+    def __init__(
+        self, validator: MotionValidator | MotionValidator3D, settings: SamplingSettings
+    ) -> None:
+        self.space: StateSpace = validator.space
+        costmap = validator.costmap if isinstance(validator, MotionValidator) else None
         plain = costmap is None or costmap.uniform
         if plain and settings.length_weight == 0 and settings.time_weight == 0:
             expected = "more than 0, as nothing else costs anything"
@@ -172,7 +174,7 @@ class Objective:
         return type("Costs", (base.OptimizationObjective,), methods)(information)
 
 
-def _turns_take_time(space: Space, settings: SamplingSettings) -> bool:
+def _turns_take_time(space: StateSpace, settings: SamplingSettings) -> bool:
     """Whether the seconds of a path are not simply its length over the speed."""
     if settings.time_weight == 0 or space in FLAT:
         return False
@@ -180,7 +182,9 @@ def _turns_take_time(space: Space, settings: SamplingSettings) -> bool:
     return space not in TURNING or tightest < settings.max_speed
 
 
-def _native(costmap: Costmap, space: Space, settings: SamplingSettings) -> Callable[..., float]:
+def _native(
+    costmap: Costmap, space: StateSpace, settings: SamplingSettings
+) -> Callable[..., float]:
     """Return OMPL's distance between two states."""
     if space == "r2":
         return _distance
@@ -193,7 +197,7 @@ def _native(costmap: Costmap, space: Space, settings: SamplingSettings) -> Calla
     )
 
 
-def _edge(costmap: Costmap, space: Space, settings: SamplingSettings) -> Callable[..., float]:
+def _edge(costmap: Costmap, space: StateSpace, settings: SamplingSettings) -> Callable[..., float]:
     costs = np.minimum(costmap.costs, MAX_NON_OBSTACLE)
     told = costs, _numbers(costmap, settings), _prices(costmap, settings)
     if space == "r2":
@@ -203,7 +207,7 @@ def _edge(costmap: Costmap, space: Space, settings: SamplingSettings) -> Callabl
     return partial(curve_cost, space == "dubins", *told)
 
 
-def _least(costmap: Costmap, space: Space, settings: SamplingSettings) -> Callable[..., float]:
+def _least(costmap: Costmap, space: StateSpace, settings: SamplingSettings) -> Callable[..., float]:
     """Return what gives the cost of the shortest path between two states over the cheapest cells.
 
     Of curves, that is the shortest one, and not the straight line: it tells far more. It is less

@@ -11,22 +11,22 @@ import numpy as np
 
 from groundmap.arrays import Floats, is_number
 from groundmap.errors import SettingsError
-from planners.answers import check_on_map, check_space
-from planners.costmap import Costmap
-from planners.engine import Cancel, Found, Pose, check_cancel, now
+from planners.costmap.costmap import Costmap
+from planners.costmap.endpoint_check import check_on_map, check_space
 from planners.errors import AuditError, ProblemError, UnsolvedError
-from planners.problem import PlanningProblem
-from planners.route import Route
-from planners.sampling.door import samplers
-from planners.sampling.found import found_of
-from planners.sampling.graph import Graph
-from planners.sampling.growth import grown
-from planners.sampling.net import Checked, Net
+from planners.problem.problem import PlanningProblem, Pose
+from planners.route.route import Route
+from planners.route.solve import solve, with_problem
+from planners.sampling.motion_validator import MotionValidator
 from planners.sampling.objectives import Objective
+from planners.sampling.ompl_module import samplers
 from planners.sampling.roadmap_files import read_roadmap, write_roadmap
+from planners.sampling.roadmap_growth import grow_roadmap
+from planners.sampling.roadmap_query import Checked, RoadmapQuery
+from planners.sampling.search_result import to_search_result
 from planners.sampling.settings import FLAT, SamplingSettings, refusal
-from planners.sampling.ways import Ways
-from planners.solve import posed, solve
+from planners.search.base import Cancel, SearchResult, check_cancel, now
+from planners.search.graph import Graph
 
 NAME = "roadmap"
 GROWERS = ("prm", "prmstar")
@@ -52,7 +52,7 @@ class Roadmap:
     graph : Graph
         The net, as plain arrays; `groundmap.draw.draw_graph` draws it.
     settings : SamplingSettings
-    ways : Ways
+    validator : MotionValidator
     name : str
 
     Examples
@@ -80,11 +80,13 @@ class Roadmap:
 
     name = NAME
 
-    def __init__(self, ways: Ways, graph: Graph, settings: SamplingSettings) -> None:
-        self.ways, self.graph, self.settings = ways, graph, settings
-        self.problem = ways.costmap.problem
-        self._objective = Objective(ways, settings)
-        self._net = Net(graph, ways, self._objective, settings)
+    def __init__(
+        self, validator: MotionValidator, graph: Graph, settings: SamplingSettings
+    ) -> None:
+        self.validator, self.graph, self.settings = validator, graph, settings
+        self.problem = validator.costmap.problem
+        self._objective = Objective(validator, settings)
+        self._net = RoadmapQuery(graph, validator, self._objective, settings)
 
     @classmethod
     def grow(
@@ -129,16 +131,18 @@ class Roadmap:
             `cancel` was set before growth began.
         """
         check_cancel(cancel)
-        ways, told = _ways_of(problem, planner, settings)
+        validator, told = _ways_of(problem, planner, settings)
         if not (is_number(seconds) and seconds > 0):
             raise SettingsError("seconds", "a number above 0 [s]", repr(seconds))
         if not samplers():
             raise ProblemError("planner", "OMPL", "none", hint="pip install ompl.")
         start = tuple(map(float, problem.start))
-        check_space(ways.costmap, "start", start, headings=ways.space not in FLAT)
-        Objective(ways, told)  # refuses what it can't weigh, before time is spent
-        graph = grown(planner, ways, ways.state_of(start), told, seconds=seconds, cancel=cancel)
-        return cls(ways, graph, told)
+        check_space(validator.costmap, "start", start, headings=validator.space not in FLAT)
+        Objective(validator, told)  # refuses what it can't weigh, before time is spent
+        graph = grow_roadmap(
+            planner, validator, validator.state_of(start), told, seconds=seconds, cancel=cancel
+        )
+        return cls(validator, graph, told)
 
     def plan(
         self, start: Sequence[float] | Floats, goal: Sequence[float] | Floats, *, audit: bool = True
@@ -173,41 +177,43 @@ class Roadmap:
         check_on_map(problem)
         try:
             return solve(
-                posed(self.ways.costmap, problem),
+                with_problem(self.validator.costmap, problem),
                 self,
                 self.settings,
                 began=began,
-                headings=self.ways.space not in FLAT,
+                headings=self.validator.space not in FLAT,
                 audited=audit,
             )
         except AuditError as error:
-            if np.array_equal(Costmap.of(problem).blocked, self.ways.costmap.blocked):
+            if np.array_equal(Costmap.of(problem).blocked, self.validator.costmap.blocked):
                 raise
             expected = "the map that the roadmap was grown on"
             hint = "Grow another roadmap."
             raise ProblemError("grid", expected, "one that has changed", hint=hint) from error
 
-    def search(self, start: Pose, goal: Pose, settings: SamplingSettings) -> Found | None:
+    def search(self, start: Pose, goal: Pose, settings: SamplingSettings) -> SearchResult | None:
         """Return a route as planners' engines do, or None if it is proved that there is none.
 
         Raises
         ------
         UnsolvedError
         """
-        ends = self.ways.state_of(start), self.ways.state_of(goal)
-        is_clear = Checked(self.ways.is_clear)
+        ends = self.validator.state_of(start), self.validator.state_of(goal)
+        is_clear = Checked(self.validator.is_clear)
         if not all(is_clear(end, end) for end in ends):
             return None
         path = self._net.path(*ends, is_clear)
         if path is None:
-            if self.ways.room(*ends) is None:
+            if self.validator.room(*ends) is None:
                 return None
             reason = f"its {len(self.graph.vertices)} places don't join them: grow it for longer"
             raise UnsolvedError(NAME, reason=reason, expanded=is_clear.count)
         if settings.simplify:
-            path = self._net.shortened(path, is_clear)
+            path = self._net.shorten(path, is_clear)
         cost = self._objective.cost(path)
-        return found_of(self.ways, path, asked=(start, goal), cost=cost, checked=is_clear.count)
+        return to_search_result(
+            self.validator, path, asked=(start, goal), cost=cost, checked=is_clear.count
+        )
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the roadmap to an ``.npz`` file, all or nothing: arrays and JSON, no pickle.
@@ -218,7 +224,7 @@ class Roadmap:
             The folder does not exist or can't be written to.
         """
         told = self.settings.model_dump(include=set(GROWTH + QUERIES), exclude_unset=True)
-        write_roadmap(path, self.graph, self.ways.costmap, told)
+        write_roadmap(path, self.graph, self.validator.costmap, told)
 
     @classmethod
     def load(cls, path: str | PathLike[str], problem: PlanningProblem) -> Roadmap:
@@ -242,12 +248,12 @@ class Roadmap:
             raise ProblemError("problem", "a PlanningProblem", repr(problem))
         graph, costmap, told = read_roadmap(path, problem)
         assert told.space is not None
-        return cls(Ways(costmap, told.space, told.turning_radius), graph, told)
+        return cls(MotionValidator(costmap, told.space, told.turning_radius), graph, told)
 
 
 def _ways_of(
     problem: PlanningProblem, planner: str, settings: dict[str, Any]
-) -> tuple[Ways, SamplingSettings]:
+) -> tuple[MotionValidator, SamplingSettings]:
     """Return the ways that a roadmap is grown over, and the checked settings."""
     told = SamplingSettings(**settings)
     for name in settings:
@@ -270,4 +276,4 @@ def _ways_of(
     if space not in FLAT and len(start) != 3:
         raise ProblemError("start", f"x, y [m] and yaw [rad] in {space}", str(start))
     told = told.model_copy(update={"space": space})
-    return Ways(Costmap.of(problem), space, told.turning_radius), told
+    return MotionValidator(Costmap.of(problem), space, told.turning_radius), told

@@ -10,17 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from groundmap.archive import read_archive, write_archive
 from groundmap.errors import FileFormatError
-from planners.answers import check_on_map
-from planners.costmap import Costmap
+from groundmap.files.archive import read_archive, write_archive
+from planners.costmap.costmap import Costmap
+from planners.costmap.endpoint_check import check_on_map
 from planners.errors import OutsideMapError
-from planners.problem import PlanningProblem
-from planners.sampling.graph import Graph
-from planners.sampling.settings import SamplingSettings, Space
+from planners.problem.problem import PlanningProblem
+from planners.sampling.settings import SamplingSettings, StateSpace
+from planners.search.graph import Graph
 
 FORMAT, VERSION = "groundmap roadmap", 1
-SPACES: tuple[Space, ...] = ("r2", "se2", "reeds_shepp")  # whose ways lead back, too
+SPACES: tuple[StateSpace, ...] = ("r2", "se2", "reeds_shepp")  # whose ways lead back, too
 
 
 def write_roadmap(

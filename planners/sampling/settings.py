@@ -9,14 +9,14 @@ import numpy as np
 from pydantic import Field, field_validator
 from pydantic_core import PydanticCustomError
 
-from planners.engine import Pose, SearchSettings
-from planners.footprint import Footprint
-from planners.problem import PlanningProblem
+from planners.problem.footprint import Footprint
+from planners.problem.problem import PlanningProblem, Pose
+from planners.search.base import SearchSettings
 
-Space = Literal["r2", "se2", "dubins", "reeds_shepp", "r3"]
-TURNING: tuple[Space, ...] = ("dubins", "reeds_shepp")  # spaces of bounded curvature
-FLAT: tuple[Space, ...] = ("r2", "r3")  # spaces without a yaw
-ROUNDING = 1e-9  # [m; rad] by which a route may miss what will do as a goal
+StateSpace = Literal["r2", "se2", "dubins", "reeds_shepp", "r3"]
+TURNING: tuple[StateSpace, ...] = ("dubins", "reeds_shepp")  # spaces of bounded curvature
+FLAT: tuple[StateSpace, ...] = ("r2", "r3")  # spaces without a yaw
+GOAL_TOLERANCE = 1e-9  # [m; rad] by which a route may miss what will do as a goal
 
 
 class SamplingSettings(SearchSettings):
@@ -28,7 +28,7 @@ class SamplingSettings(SearchSettings):
     own value counts, and a planner that has no such parameter refuses it.
     """
 
-    space: Space | None = Field(
+    space: StateSpace | None = Field(
         None,
         description="r2 (places), se2 (poses, turning on the spot), dubins (forward, turning"
         " radius), reeds_shepp (backwards too), r3 (on 3-D maps); none: se2 for an outline whose"
@@ -159,7 +159,7 @@ class SamplingSettings(SearchSettings):
 
     def will_do(self, end: Pose, goal: Pose, *, axes: int) -> bool:
         """Whether a route to a goal may end in a pose: near enough to one, turned as it will do."""
-        near, turned = self.goal_radius + ROUNDING, self.goal_yaw_tolerance + ROUNDING
+        near, turned = self.goal_radius + GOAL_TOLERANCE, self.goal_yaw_tolerance + GOAL_TOLERANCE
         return any(
             math.dist(end[:axes], other[:axes]) <= near
             and all(
@@ -169,7 +169,9 @@ class SamplingSettings(SearchSettings):
             for other in (goal, *self.goals)
         )
 
-    def space_for(self, footprint: Footprint, start: Pose, goal: Pose, *, axes: int = 2) -> Space:
+    def space_for(
+        self, footprint: Footprint, start: Pose, goal: Pose, *, axes: int = 2
+    ) -> StateSpace:
         """Return the space to plan in on a map of two axes or three."""
         if axes == 3:
             return "r3"
@@ -206,7 +208,7 @@ ENDLESS = "It may look for a better sample for ever: take 'informedrrtstar'."
 FIXED = {("sorrtstar", name) for name in ("focus_search", "informed_sampling", "sample_rejection")}
 # What ends the process, or brings paths that can't be driven: tried by
 # `tools/crash_matrix.py --refused`.
-REFUSED: dict[tuple[str, Space | None], str] = {
+REFUSED: dict[tuple[str, StateSpace | None], str] = {
     ("aorrtc", None): "OMPL's AORRTC crashes: take 'bitstar'.",
     ("bfmt", "dubins"): ONE_WAY,
     ("bkpiece1", "dubins"): ONE_WAY,
@@ -219,7 +221,7 @@ REFUSED: dict[tuple[str, Space | None], str] = {
 }
 
 
-def refusal(planner: str, space: Space) -> str | None:
+def refusal(planner: str, space: StateSpace) -> str | None:
     """Return why a planner is not let loose in a space; None if it is.
 
     Examples

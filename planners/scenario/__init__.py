@@ -1,1 +1,1 @@
-"""Scenarios: worlds that are known, what is mapped of them, and the bounds that it must keep."""
+"""Scenarios: simulated worlds or logs, and the bounds that their maps must keep."""

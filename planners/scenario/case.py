@@ -9,21 +9,16 @@ from typing import Any
 
 from pydantic import Field
 
-from groundmap.documents import read_toml
 from groundmap.errors import FileFormatError, InputError
+from groundmap.files.documents import read_toml
 from groundmap.settings import GroundSettings, MapperSettings, Settings
 from groundmap.simulate.drive import DriveSettings
-from groundmap.simulate.parts import HoleSettings, SolidSettings
 from groundmap.simulate.scan import ScanSettings
 from groundmap.simulate.sensor import SensorSettings
+from groundmap.simulate.world_file import HoleSettings, SolidSettings
 from groundmap.simulate.worlds import GENERATORS, WorldGenerator
 from planners.scenario.outcome import Bound
-from planners.scenario.queries import (
-    QuerySettings,
-    bound_from,
-    check_query,
-    check_stated_once,
-)
+from planners.scenario.queries import QuerySettings, bound_from, check_query, check_stated_once
 
 FILE = "scenario.toml"
 

@@ -9,7 +9,7 @@ import warnings
 from functools import cache
 
 from groundmap.errors import InputError
-from groundmap.printable import shown
+from groundmap.printable import format_value
 
 MOST_CHARACTERS = 500
 TIME_LIMIT = 5.0  # [s] of a search
@@ -38,7 +38,7 @@ def check_pattern(name: str, pattern: str) -> None:
             warnings.simplefilter("ignore")  # of what a later Python may understand otherwise
             re.compile(pattern)
     except (re.error, RecursionError, OverflowError) as error:
-        raise InputError(name, f"a regular expression ({error})", shown(pattern)) from error
+        raise InputError(name, f"a regular expression ({error})", format_value(pattern)) from error
 
 
 @cache

@@ -10,8 +10,8 @@ from pydantic import Field
 from groundmap.errors import InputError, SettingsError
 from groundmap.settings import Settings
 from planners.errors import ProblemError
-from planners.footprint import Footprint
-from planners.problem import Unknown
+from planners.problem.footprint import Footprint
+from planners.problem.problem import Unknown
 from planners.registry import PLANNERS
 from planners.scenario.outcome import REASON, Bound
 from planners.scenario.patterns import check_pattern

@@ -8,7 +8,7 @@ from html import escape
 from os import PathLike
 from typing import NamedTuple
 
-from groundmap.archive import write_atomically
+from groundmap.files.archive import write_atomically
 from planners.scenario.outcome import Figure, Outcome
 from planners.scenario.table import remarks, summary, verdict
 
@@ -74,12 +74,12 @@ def write_report(
     write_atomically(path, lambda stream: stream.write(text.encode()))
 
 
-def shown(value: Figure) -> str:
+def format_figure(value: Figure) -> str:
     """Return a figure as people read it: four digits of what is not whole.
 
     Examples
     --------
-    >>> shown(0.123456), shown(52544), shown(None)
+    >>> format_figure(0.123456), format_figure(52544), format_figure(None)
     ('0.1235', '52544', 'not measured')
     """
     if value is None:
@@ -153,7 +153,7 @@ def _figure(name: str, outcome: Outcome) -> str:
     return _tag(
         "tr",
         _tag("td", escape(name.replace("_", " "))),
-        _tag("td", escape(shown(value)), kind="" if isinstance(value, str) else "number"),
+        _tag("td", escape(format_figure(value)), kind="" if isinstance(value, str) else "number"),
         _tag("td", escape("" if bound is None else str(bound))),
         _tag("td", mark, kind="verdict"),
         kind="" if holds is None else CLASSES[holds],
@@ -162,8 +162,8 @@ def _figure(name: str, outcome: Outcome) -> str:
 
 def _section(section: Section) -> str:
     head, *body = section.rows or ((),)
-    rows = (_tag("tr", *(_tag("td", escape(shown(cell))) for cell in row)) for row in body)
-    table = _table([shown(cell) for cell in head], rows) if section.rows else ""
+    rows = (_tag("tr", *(_tag("td", escape(format_figure(cell))) for cell in row)) for row in body)
+    table = _table([format_figure(cell) for cell in head], rows) if section.rows else ""
     return _tag(
         "section",
         _tag("h2", escape(section.title)),

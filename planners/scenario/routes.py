@@ -12,8 +12,8 @@ from groundmap.arrays import Floats
 from groundmap.errors import InputError
 from groundmap.simulate.truth import touched_cells
 from planners.errors import PlanningError
-from planners.problem import PlanningProblem
-from planners.registry import plan
+from planners.planning import plan
+from planners.problem.problem import PlanningProblem
 from planners.scenario.outcome import REASON, Figure
 from planners.scenario.queries import OUTCOME, QuerySettings
 from planners.scenario.simulated import Simulated
@@ -29,7 +29,7 @@ IN_TRUTH: dict[str, Any] = {
 }
 
 
-class Answer(NamedTuple):
+class QueryOutcome(NamedTuple):
     """What became of one query."""
 
     query: QuerySettings
@@ -39,7 +39,7 @@ class Answer(NamedTuple):
     figures: dict[str, Figure]
 
 
-def ask(query: QuerySettings, grid: ConfidenceGrid) -> Answer:
+def ask(query: QuerySettings, grid: ConfidenceGrid) -> QueryOutcome:
     """Plan on a map."""
     told = dict(query.settings)
     if query.time_limit is not None:
@@ -55,16 +55,18 @@ def ask(query: QuerySettings, grid: ConfidenceGrid) -> Answer:
         route = plan(problem, query.planner, **told)
     except PlanningError as error:
         name, reason = type(error).__name__, str(error)
-        return Answer(query, name, reason, None, {"outcome": name, REASON: reason})
+        return QueryOutcome(query, name, reason, None, {"outcome": name, REASON: reason})
     figures: dict[str, Figure] = {
         "outcome": OUTCOME,
         "length": route.length,
         "min_clearance": route.min_clearance,
     }
-    return Answer(query, OUTCOME, "", route.waypoints, figures)
+    return QueryOutcome(query, OUTCOME, "", route.waypoints, figures)
 
 
-def held_to_truth(answer: Answer, simulated: Simulated, fine: ConfidenceGrid) -> Answer:
+def compare_with_truth(
+    answer: QueryOutcome, simulated: Simulated, fine: ConfidenceGrid
+) -> QueryOutcome:
     """Add what the true world says of a route: how near it comes, how much longer it is."""
     if answer.waypoints is None:
         return answer

@@ -10,12 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from groundmap import GridWindow, GroundmapError, GroundMapper, draw, fit_ground, read_views
-from groundmap.evaluate import evaluate
+from groundmap.evaluate.protocols import evaluate
 from groundmap.simulate.measures import measure
 from planners.scenario.case import Scenario, load_scenario
 from planners.scenario.outcome import Bound, Figure, Outcome
 from planners.scenario.queries import bounds_of
-from planners.scenario.routes import Answer, ask, held_to_truth, true_map
+from planners.scenario.routes import QueryOutcome, ask, compare_with_truth, true_map
 from planners.scenario.simulated import Simulated, simulate
 
 DPI = 100  # of the pictures in the report
@@ -39,16 +39,16 @@ def run_scenario(path: Path) -> Outcome:
         )
     began = time.perf_counter()
     try:
-        result = _recorded(scenario) if scenario.log else _simulated(scenario)
+        result = _run_recorded(scenario) if scenario.log else _run_simulated(scenario)
     except GroundmapError as error:
-        result = Result({}, [], b"", f"{type(error).__name__}: {error}")
+        result = CaseResult({}, [], b"", f"{type(error).__name__}: {error}")
     figures, bounds = dict(result.figures), dict(scenario.bounds)
     for answer in result.answers:
         name = answer.query.name
         figures |= {f"{name}.{key}": value for key, value in answer.figures.items()}
         held = bounds_of(answer.query, known_world=scenario.log is None)
         bounds |= {f"{name}.{key}": bound for key, bound in held.items()}
-    missed = (result.error,) if result.error else _missed(figures, bounds, result.answers)
+    missed = (result.error,) if result.error else _list_missed(figures, bounds, result.answers)
     return Outcome(
         name=scenario.name,
         why=scenario.why,
@@ -61,27 +61,27 @@ def run_scenario(path: Path) -> Outcome:
     )
 
 
-class Result(NamedTuple):
+class CaseResult(NamedTuple):
     """What a scenario gave, before it is held to its bounds."""
 
     figures: dict[str, Figure]
-    answers: list[Answer]
+    answers: list[QueryOutcome]
     picture: bytes  # PNG
     error: str = ""  # why there is none of it
 
 
-def _simulated(scenario: Scenario) -> Result:
+def _run_simulated(scenario: Scenario) -> CaseResult:
     """Map a world and hold map and routes against it."""
     simulated = simulate(scenario)
     figures: dict[str, Figure] = dict(asdict(measure(simulated.window, simulated.truth)))
     answers = [ask(query, simulated.grid) for query in scenario.queries]
     if answers:
         fine = true_map(simulated)
-        answers = [held_to_truth(answer, simulated, fine) for answer in answers]
-    return Result(figures, answers, _picture(simulated, answers, scenario.name))
+        answers = [compare_with_truth(answer, simulated, fine) for answer in answers]
+    return CaseResult(figures, answers, _picture(simulated, answers, scenario.name))
 
 
-def _recorded(scenario: Scenario) -> Result:
+def _run_recorded(scenario: Scenario) -> CaseResult:
     """Map a log, whose truth nobody knows, and judge it by features held out of it."""
     assert scenario.log is not None
     settings, ground = scenario.mapper.model_dump(), scenario.ground.model_dump()
@@ -101,10 +101,10 @@ def _recorded(scenario: Scenario) -> Result:
     for answer in answers:
         if answer.waypoints is not None:
             draw.draw_route(answer.waypoints, footprint=answer.query.radius, ax=axes)
-    return Result(figures, answers, draw.figure_png(figure, dpi=DPI))
+    return CaseResult(figures, answers, draw.figure_png(figure, dpi=DPI))
 
 
-def _picture(simulated: Simulated, answers: list[Answer], title: str) -> bytes:
+def _picture(simulated: Simulated, answers: list[QueryOutcome], title: str) -> bytes:
     """Draw truth, map and difference, of the world and a margin around it."""
     truth, window = simulated.truth, simulated.window
     corners = window.world_to_cell(np.reshape(simulated.world.bounds, (2, 2)))
@@ -140,8 +140,8 @@ def _picture(simulated: Simulated, answers: list[Answer], title: str) -> bytes:
     return draw.figure_png(figure, dpi=DPI)
 
 
-def _missed(
-    figures: dict[str, Figure], bounds: dict[str, Bound], answers: list[Answer]
+def _list_missed(
+    figures: dict[str, Figure], bounds: dict[str, Bound], answers: list[QueryOutcome]
 ) -> tuple[str, ...]:
     """Return a sentence for each bound that does not hold."""
     reasons = {f"{answer.query.name}.outcome": answer.reason for answer in answers}

@@ -11,7 +11,7 @@ import numpy as np
 from groundmap import ConfidenceGrid, GridWindow, GroundMapper, View, fit_ground
 from groundmap.draw import known_bounds
 from groundmap.errors import InputError
-from groundmap.simulate import Drive, World, drive, observe, strew
+from groundmap.simulate import Drive, World, drive, observe, sample_landmarks
 from groundmap.simulate.scan import scan
 from groundmap.simulate.truth import Truth, truth_of
 from planners.scenario.case import Scenario
@@ -56,7 +56,7 @@ def views_of(scenario: Scenario, world: World, moves: Drive) -> Iterable[View]:
     """Return the views of the scenario's sensor, or of the ideal one that it asks for."""
     if scenario.scan is not None:
         return scan(world, moves, scenario.sensor, scenario.scan, scenario.mapper)
-    landmarks = strew(world, np.random.default_rng((scenario.seed, 2)))
+    landmarks = sample_landmarks(world, np.random.default_rng((scenario.seed, 2)))
     return observe(world, landmarks, moves, scenario.sensor, seed=scenario.seed)
 
 

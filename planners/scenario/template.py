@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from groundmap.archive import write_atomically
 from groundmap.errors import FileFormatError, InputError
+from groundmap.files.archive import write_atomically
 from planners.scenario.case import FILE
 
 TEMPLATE = '''\

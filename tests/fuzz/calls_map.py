@@ -28,8 +28,8 @@ from groundmap import (
     read_views,
     write_views,
 )
-from groundmap.evaluate import evaluate
-from groundmap.fusion import Average, Capped
+from groundmap.evaluate.protocols import evaluate
+from groundmap.grid.fusion import Average, Capped
 from groundmap.io import export
 from groundmap.simulate import (
     DriveSettings,
@@ -39,10 +39,10 @@ from groundmap.simulate import (
     World,
     drive,
     observe,
-    strew,
+    sample_landmarks,
 )
-from groundmap.simulate.parts import HoleSettings, SolidSettings
 from groundmap.simulate.shapes import box, pole, polygon, table, wall
+from groundmap.simulate.world_file import HoleSettings, SolidSettings
 
 OPTICAL = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.2], [0, 0, 0, 1]])
 PIXELS = np.array([[350.0, 300, 400], [300, 250, 420], [355, 300, 410], [320, 280, 250]])
@@ -321,7 +321,7 @@ def world(draw: Draw, _folder: Path) -> None:
 def _observed(made: World, draw: Draw) -> None:
     sensor = SensorSettings(**settings_of(draw, SensorSettings, odds=0.15, most=2))
     moves = drive(DriveSettings(stops=((1, 1, 45),)), np.random.default_rng(1))
-    landmarks = strew(made, np.random.default_rng(1))
+    landmarks = sample_landmarks(made, np.random.default_rng(1))
     for seen in observe(made, landmarks, moves, sensor, seed=1):
         len(seen.points)
 

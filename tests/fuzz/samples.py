@@ -12,7 +12,7 @@ import numpy as np
 from PIL import Image
 
 from groundmap import ConfidenceGrid
-from groundmap.fusion import Capped
+from groundmap.grid.fusion import Capped
 from planners import PlanningProblem, Roadmap
 
 Files = dict[str, bytes]

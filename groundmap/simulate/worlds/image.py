@@ -60,7 +60,7 @@ class MapImage(BuiltWorld):
         """
         found = self._read()
         if self.crop is not None:
-            found = _cropped(found, self.crop)
+            found = _crop(found, self.crop)
         corner = np.array(found.origin)
         rows, cols = found.blocked.shape
         walls = shapely.transform(
@@ -97,7 +97,7 @@ def outlines(blocked: Bools) -> list[shapely.Polygon]:
     return [shapely.union_all(group) for group in np.split(runs[order], first)[1:]]
 
 
-def _cropped(found: BlockedMap, crop: Box) -> BlockedMap:
+def _crop(found: BlockedMap, crop: Box) -> BlockedMap:
     rows, cols = found.blocked.shape
     x = _within(found.origin[0], found.resolution, cols, crop[0], crop[2])
     y = _within(found.origin[1], found.resolution, rows, crop[1], crop[3])

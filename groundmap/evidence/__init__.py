@@ -1,0 +1,1 @@
+"""What one view says about the cells around it."""

@@ -1,0 +1,1 @@
+"""Numba kernels of the 2-D evidence."""

@@ -1,0 +1,136 @@
+"""Lines of sight in the ground plane: what they pass through, and the gaps between them.
+
+The viewpoint is the origin. Lines are sorted by bearing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from groundmap.arrays import Bools, Floats
+
+WIDEST_GAP = 1.5  # [rad], between two lines: a chord must not pass the viewpoint
+NARROWEST_GAP = 1e-9  # [rad], and of a surface: nothing is seen through one seen end-on
+
+
+@njit(cache=True, nogil=True)
+def count_contradicting(
+    ends: Floats,
+    reach: Floats,
+    tops: Floats,
+    bearings: Floats,
+    points: Floats,
+    heights: Floats,
+    shares: Floats,
+    camera_height: float,
+    behind: float,
+    below: float,
+    against: Floats,
+    passes: Bools,
+) -> None:
+    """Count, for each surface, the features behind it that are seen below its top.
+
+    Parameters
+    ----------
+    ends : ndarray, shape (s, 2, 2)
+        Counter-clockwise around the viewpoint.
+    reach, tops : ndarray, shape (s, 2)
+        At both ends.
+    bearings, points, heights, shares : ndarray, shapes (n,), (n, 2), (n,), (n,)
+        Of the features, sorted by bearing; `shares` is what each row counts.
+    camera_height, behind, below : float
+        A feature is behind if it is so by twice the reach and `behind`; its line of sight passes
+        below the top if it does by `below`.
+    against : ndarray, shape (s,)
+        What is counted is added here.
+    passes : ndarray of bool, shape (n,)
+        Set where a feature is seen through any surface.
+    """
+    ranges = np.hypot(points[:, 0], points[:, 1])
+    for s in range(len(ends)):
+        x0, y0 = ends[s, 0, 0], ends[s, 0, 1]
+        ex, ey = ends[s, 1, 0] - x0, ends[s, 1, 1] - y0
+        first, last = np.arctan2(y0, x0), np.arctan2(ends[s, 1, 1], ends[s, 1, 0])
+        if last - first < NARROWEST_GAP:  # seen end-on, or across the seam, behind the camera
+            continue
+        square = ex * ex + ey * ey
+        row = np.searchsorted(bearings, first)
+        while row < len(bearings) and bearings[row] <= last:
+            x, y = points[row, 0], points[row, 1]
+            row += 1
+            facing = x * ey - y * ex
+            if facing == 0.0:
+                continue
+            share = (x0 * ey - y0 * ex) / facing  # range of the surface / of the feature
+            if share >= 1.0:  # in front of the surface
+                continue
+            t = ((x * share - x0) * ex + (y * share - y0) * ey) / square
+            t = min(max(t, 0.0), 1.0)
+            away = (1.0 - share) * ranges[row - 1]
+            if away <= 2.0 * ((1 - t) * reach[s, 0] + t * reach[s, 1]) + behind:
+                continue
+            sight = camera_height + (heights[row - 1] - camera_height) * share
+            if sight < (1 - t) * tops[s, 0] + t * tops[s, 1] - below:
+                against[s] += shares[row - 1]
+                passes[row - 1] = True
+
+
+@njit(cache=True, nogil=True)
+def features_beside(
+    rays: Floats, first: Floats, last: Floats, points: Floats, width: float, beside: Bools
+) -> None:
+    """Tell which lines of sight have a point beside them.
+
+    Parameters
+    ----------
+    rays : ndarray, shape (n, 2)
+        Directions of the lines, of length 1.
+    first, last : ndarray, shape (n,)
+        Between which distances along the line a point counts.
+    points : ndarray, shape (k, 2)
+    width : float
+        How far across the line a point may be.
+    beside : ndarray of bool, shape (n,)
+        Set to the answer.
+    """
+    for i in range(len(rays)):
+        x, y = rays[i]
+        beside[i] = False
+        for k in range(len(points)):
+            if abs(x * points[k, 1] - y * points[k, 0]) < width:
+                along = x * points[k, 0] + y * points[k, 1]
+                if first[i] < along < last[i]:
+                    beside[i] = True
+                    break
+
+
+@njit(cache=True, nogil=True)
+def gap_chords(bearings: Floats, ranges: Floats, widest: float) -> Floats:
+    """Return chords between lines of sight that nothing `widest` wide fits between.
+
+    Two lines are neighbours at a range if no line between them reaches as far. Their chord lies
+    where both still reach and are `widest` apart at most. Returns shape (k, 2, 2), counter-
+    clockwise.
+    """
+    count = len(bearings)
+    chords = np.empty((2 * count, 2, 2))
+    stack = np.empty(count, np.int64)  # lines that something to the left may still neighbour
+    size, top = 0, 0
+    for j in range(count):
+        while top > 0:
+            i = stack[top - 1]
+            gap = bearings[j] - bearings[i]
+            if NARROWEST_GAP < gap < WIDEST_GAP:
+                radius = min(ranges[i], ranges[j], 0.5 * widest / np.sin(0.5 * gap))
+                chords[size, 0, 0] = radius * np.cos(bearings[i])
+                chords[size, 0, 1] = radius * np.sin(bearings[i])
+                chords[size, 1, 0] = radius * np.cos(bearings[j])
+                chords[size, 1, 1] = radius * np.sin(bearings[j])
+                size += 1
+            if ranges[i] > ranges[j]:
+                break
+            top -= 1
+        stack[top] = j
+        top += 1
+    return chords[:size]

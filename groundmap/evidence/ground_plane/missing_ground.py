@@ -1,0 +1,43 @@
+"""Places without ground, below which lines of sight pass."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from groundmap.arrays import Bools, Floats, Ints
+from groundmap.evidence.ground_plane.height_classes import GroundView
+from groundmap.evidence.ground_plane.kernels.lines import (
+    features_beside,
+)
+
+DEEPEST_SIGHT = 3.0  # [m], along the ground: longer lines below it are mostly false matches
+BESIDE = 0.15  # [m], a ground feature this near to a line of sight is beside it
+
+
+def missing_ground(ground_view: GroundView, step: float) -> Floats:
+    """Return places, `step` [m] apart, that lines of sight to features below the ground pass over.
+
+    From where they go below the ground's level up to the feature, shape (n, 2) [m, view]. A line
+    that ground features lie beside there is that of a false match, and is left out.
+    """
+    range_at_end = np.hypot(ground_view.drop_offs[:, 0], ground_view.drop_offs[:, 1])
+    entry = ground_view.camera_height / (ground_view.camera_height - ground_view.drop_off_heights)
+    gap = range_at_end * (1.0 - entry)
+    rows = np.flatnonzero(gap <= DEEPEST_SIGHT)
+    rows = rows[~_beside_ground(ground_view, rows, (entry * range_at_end)[rows])]
+    counts = np.ceil(gap[rows] / step).astype(np.int64)
+    line = np.repeat(rows, counts)
+    number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    share = entry[line] + (1.0 - entry[line]) * (number + 0.5) / np.repeat(counts, counts)
+    places: Floats = ground_view.drop_offs[line] * share[:, None]
+    return places
+
+
+def _beside_ground(ground_view: GroundView, rows: Ints, entry: Floats) -> Bools:
+    """Return which of these drop-offs' lines have ground beside them beyond `entry` [m]."""
+    ends = ground_view.drop_offs[rows]
+    rays = ends / np.hypot(ends[:, 0], ends[:, 1])[:, None]
+    end = (rays * ends).sum(axis=1)
+    beside = np.empty(len(rows), dtype=np.bool_)
+    features_beside(rays, entry + BESIDE, end - BESIDE, ground_view.supports, BESIDE, beside)
+    return beside

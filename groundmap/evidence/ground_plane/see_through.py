@@ -1,0 +1,92 @@
+"""Surfaces that features are seen through, and how far they are still believed."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from groundmap.arrays import Bools, Floats
+from groundmap.evidence.ground_plane.height_classes import GroundView
+from groundmap.evidence.ground_plane.kernels.lines import (
+    count_contradicting,
+)
+from groundmap.evidence.ground_plane.surfaces import SurfaceKind, Surfaces
+
+BELOW = 0.05  # [m], sight that passes this little below a top may have passed over it
+BEHIND = 0.05  # [m], a feature this little behind a surface is on it
+THIN = 0.02  # [m], half-width of the thinnest pole: beside it, one sees past a lone point
+# How many features make up a surface; if more are seen through it, it hides nothing.
+MADE_OF = {
+    SurfaceKind.SEGMENT: 2.0,
+    SurfaceKind.LINK: 2.0,
+    SurfaceKind.LONE: 1.0,
+    SurfaceKind.DOUBTFUL: 1.0,
+}
+
+
+class Contradictions(NamedTuple):
+    """Surfaces against the features that are seen through them."""
+
+    against: Floats  #: shape (s,), features behind it that are seen below its top
+    belief: Floats  #: shape (s,), 1, or for an outnumbered surface the share of those who make it
+    features: int  #: that are seen through any surface
+
+    @property
+    def hiding(self) -> Bools:
+        """Which surfaces hide what is behind them, shape (s,): those that are not outnumbered."""
+        hiding: Bools = self.belief == 1.0
+        return hiding
+
+
+def contradictions(ground_view: GroundView, surfaces: Surfaces) -> Contradictions:
+    """Count, for each surface, the features that are seen through it.
+
+    A feature that is seen *over* a surface is behind it, as it should be; one whose line of sight
+    passes below its top contradicts it. A surface that more features contradict than make it up
+    is most likely the ghost of a false match.
+    """
+    points = np.concatenate([ground_view.points, ground_view.supports])
+    heights = np.concatenate([ground_view.heights, ground_view.support_heights])
+    bearings = np.arctan2(points[:, 1], points[:, 0])
+    order = np.argsort(bearings, kind="stable")
+    feature = ground_view.feature[order]
+    _, number, rows = np.unique(feature, return_inverse=True, return_counts=True)
+    shares = 1.0 / rows[number]  # the ends of a segment are one feature
+    bearings, points, heights = bearings[order], points[order], heights[order]
+    ends = _solid_ends(surfaces)
+
+    def count(which: Bools, below: float) -> tuple[Floats, Bools]:
+        against, passes = np.zeros(int(which.sum())), np.zeros(len(order), dtype=np.bool_)
+        count_contradicting(
+            ends[which],
+            surfaces.reach[which],
+            surfaces.tops[which],
+            bearings,
+            points,
+            heights,
+            shares,
+            ground_view.camera_height,
+            BEHIND,
+            below,
+            against,
+            passes,
+        )
+        return against, passes
+
+    firm = surfaces.kind != SurfaceKind.DOUBTFUL
+    against = np.zeros(len(firm))
+    against[firm], passes = count(firm, BELOW)
+    against[~firm], _ = count(~firm, 0.0)
+    made_of = np.array([MADE_OF[kind] for kind in SurfaceKind])[surfaces.kind]
+    belief = np.where(against > made_of, made_of / (made_of + against), 1.0)
+    return Contradictions(against, belief, len(np.unique(feature[passes])))
+
+
+def _solid_ends(surfaces: Surfaces) -> Floats:
+    """Return the ends of surfaces, a lone point's as near to it as the thinnest pole's."""
+    middle = surfaces.ends.mean(axis=1, keepdims=True)
+    lone = surfaces.discs > 0
+    share = np.where(lone, np.minimum(THIN / np.where(lone, surfaces.discs, 1.0), 1.0), 1.0)
+    ends: Floats = middle + share[:, None, None] * (surfaces.ends - middle)
+    return ends

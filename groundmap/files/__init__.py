@@ -1,0 +1,1 @@
+"""Files opened, read and written whole: documents, arrays, our own archives."""

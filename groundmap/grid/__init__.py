@@ -1,0 +1,1 @@
+"""What is known: cells, tiles, files of maps, and the update rules."""

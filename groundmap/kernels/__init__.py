@@ -1,1 +1,0 @@
-"""Numba kernels over plain arrays, and nothing else."""

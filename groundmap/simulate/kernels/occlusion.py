@@ -1,0 +1,142 @@
+"""What hides what, among prisms: straight sight against footprints with heights.
+
+A footprint is a set of edges, holes and all: inside is where a line has crossed an odd number of
+them. An edge belongs to its lower end but not to its upper, so that a line through a corner counts
+it once.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from groundmap.arrays import Bools, Floats, Ints
+
+TINY = 1e-12  # of a line of sight: a corner that is touched hides nothing
+
+
+@njit(cache=True, nogil=True)
+def find_hidden(
+    eye: Floats, targets: Floats, edges: Floats, starts: Ints, heights: Floats, out: Bools
+) -> None:
+    """Tell which targets have a prism between them and the eye.
+
+    Parameters
+    ----------
+    eye : ndarray, shape (3,)
+    targets : ndarray, shape (n, 3)
+    edges : ndarray, shape (e, 4)
+        x0, y0, x1, y1 of all footprints' edges, footprint by footprint.
+    starts : ndarray, shape (p + 1,)
+        The first edge of each footprint; at last, e.
+    heights : ndarray, shape (p, 2)
+        Bottom and top.
+    out : ndarray of bool, shape (n,)
+        Set to the answer.
+    """
+    prisms = len(starts) - 1
+    most = 0
+    boxes = np.empty((prisms, 4))
+    for p in range(prisms):
+        most = max(most, starts[p + 1] - starts[p])
+        boxes[p] = _box_of(edges[starts[p] : starts[p + 1]])
+    crossings = np.empty(most)
+    for i in range(len(targets)):
+        target = targets[i]
+        out[i] = False
+        for p in range(prisms):
+            if _beside(eye, target, boxes[p]):
+                continue
+            first, last = _between(eye[2], target[2], heights[p, 0], heights[p, 1])
+            if last - first <= TINY:
+                continue
+            count = _cross(eye, target, edges[starts[p] : starts[p + 1]], crossings)
+            if _overlaps(crossings, count, first, last):
+                out[i] = True
+                break
+
+
+@njit(cache=True, nogil=True)
+def first_hits(eye: Floats, bearings: Floats, edges: Floats, ranges: Floats, which: Ints) -> None:
+    """Set, for each bearing, the range of the nearest edge and its row; inf and -1 for none."""
+    for i in range(len(bearings)):
+        cos, sin = np.cos(bearings[i]), np.sin(bearings[i])
+        ranges[i], which[i] = np.inf, -1
+        for e in range(len(edges)):
+            x0, y0 = edges[e, 0] - eye[0], edges[e, 1] - eye[1]
+            x1, y1 = edges[e, 2] - eye[0], edges[e, 3] - eye[1]
+            side0, side1 = cos * y0 - sin * x0, cos * y1 - sin * x1
+            if (side0 >= 0) == (side1 >= 0):
+                continue
+            share = side0 / (side0 - side1)
+            ahead = cos * (x0 + share * (x1 - x0)) + sin * (y0 + share * (y1 - y0))
+            if 0 < ahead < ranges[i]:
+                ranges[i], which[i] = ahead, e
+
+
+@njit(cache=True, nogil=True)
+def _box_of(edges: Floats) -> Floats:
+    box = np.array([np.inf, np.inf, -np.inf, -np.inf])
+    for e in range(len(edges)):
+        for end in range(2):
+            x, y = edges[e, 2 * end], edges[e, 2 * end + 1]
+            box[0], box[1] = min(box[0], x), min(box[1], y)
+            box[2], box[3] = max(box[2], x), max(box[3], y)
+    return box
+
+
+@njit(cache=True, nogil=True)
+def _beside(eye: Floats, target: Floats, box: Floats) -> bool:
+    """Tell whether the box around a line of sight misses another box."""
+    for axis in range(2):
+        if max(eye[axis], target[axis]) < box[axis]:
+            return True
+        if min(eye[axis], target[axis]) > box[axis + 2]:
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def _between(start: float, end: float, bottom: float, top: float) -> tuple[float, float]:
+    """Return from where to where, 0 to 1, a line of sight is between two heights."""
+    if start == end:
+        if bottom < start < top:
+            return 0.0, 1.0
+        return 1.0, 0.0
+    a, b = (bottom - start) / (end - start), (top - start) / (end - start)
+    return max(min(a, b), 0.0), min(max(a, b), 1.0)
+
+
+@njit(cache=True, nogil=True)
+def _cross(eye: Floats, target: Floats, edges: Floats, crossings: Floats) -> int:
+    """Collect, in order, where the whole line through eye and target crosses edges (0 to 1: sight).
+
+    The whole line, so that there is an even number of them.
+    """
+    dx, dy = target[0] - eye[0], target[1] - eye[1]
+    count = 0
+    for e in range(len(edges)):
+        x0, y0 = edges[e, 0] - eye[0], edges[e, 1] - eye[1]
+        x1, y1 = edges[e, 2] - eye[0], edges[e, 3] - eye[1]
+        side0, side1 = dx * y0 - dy * x0, dx * y1 - dy * x1
+        if (side0 >= 0) == (side1 >= 0):
+            continue
+        share = side0 / (side0 - side1)
+        x, y = x0 + share * (x1 - x0), y0 + share * (y1 - y0)
+        at = (x * dx + y * dy) / (dx * dx + dy * dy)
+        place = count
+        while place > 0 and crossings[place - 1] > at:
+            crossings[place] = crossings[place - 1]
+            place -= 1
+        crossings[place] = at
+        count += 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _overlaps(crossings: Floats, count: int, first: float, last: float) -> bool:
+    """Tell whether a piece inside the footprint and the piece first..last share a length."""
+    for k in range(0, count - 1, 2):
+        if min(crossings[k + 1], last) - max(crossings[k], first) > TINY:
+            return True
+    return False

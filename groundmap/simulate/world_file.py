@@ -1,0 +1,96 @@
+"""Solids and holes as a scenario file has them: one table for each."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import shapely
+from pydantic import Field
+
+from groundmap.errors import InputError
+from groundmap.settings import Settings
+from groundmap.simulate.shapes import box, pole, polygon, table, wall
+from groundmap.simulate.world import Hole, Solid
+
+Point = tuple[float, float]
+Box = tuple[float, float, float, float]
+OF_SOLIDS = ("texture", "lines", "edges", "transparent", "repeat", "velocity")
+TOP, TABLE_TOP = 2.5, 0.75  # [m], unless told
+
+
+class _Shaped(Settings):
+    """Something with an outline, given in one way of several."""
+
+    box: Box | None = Field(None, description="x0, y0, x1, y1: two opposite corners [m]")
+    polygon: tuple[Point, ...] | None = Field(None, description="corners x, y [m]")
+
+    def _pick_given(self, *ways: str) -> str:
+        """Return the one way that is given."""
+        given = [way for way in ways if getattr(self, way) is not None]
+        if len(given) != 1:
+            raise InputError("shape", f"one of {', '.join(ways)}", " and ".join(given) or "none")
+        return given[0]
+
+
+class SolidSettings(_Shaped):
+    """One solid, or one table; see `groundmap.simulate.Solid`."""
+
+    wall: tuple[Point, ...] | None = Field(None, description="corners of its centre line [m]")
+    thickness: float = Field(0.2, gt=0, description="of a wall [m]")
+    pole: Point | None = Field(None, description="x, y of its middle [m]")
+    radius: float = Field(0.06, gt=0, description="of a pole [m]")
+    table: Box | None = Field(None, description="two opposite corners of its top [m]")
+    top: float | None = Field(
+        None, description="height of its top; 2.5, of a table 0.75, unless told [m]"
+    )
+    bottom: float = Field(0.0, description="height of its underside [m]")
+    texture: float = Field(6.0, ge=0, description="point features on it [1/m²]")
+    lines: float = Field(0.4, ge=0, description="segments on it, in each direction [1/m²]")
+    edges: bool = Field(True, description="whether its edges are matched")
+    transparent: bool = Field(False, description="glass")
+    repeat: float = Field(0.0, ge=0, description="spacing of a repeated pattern; 0 for none [m]")
+    appears: float | None = Field(None, description="since when it is there [s]")
+    vanishes: float | None = Field(None, description="until when it is there [s]")
+    velocity: tuple[float, float] = Field((0.0, 0.0), description="along x and y [m/s]")
+
+    def solids(self) -> tuple[Solid, ...]:
+        """Return what the table describes; a table in the room is five solids.
+
+        Examples
+        --------
+        >>> [solid] = SolidSettings(pole=(2.0, 1.0), radius=0.1, top=2.0).solids()
+        >>> solid.top, round(solid.outline.area, 3)
+        (2.0, 0.03)
+        """
+        options: dict[str, Any] = {name: getattr(self, name) for name in OF_SOLIDS}
+        options["present"] = (
+            -math.inf if self.appears is None else self.appears,
+            math.inf if self.vanishes is None else self.vanishes,
+        )
+        way = self._pick_given("box", "polygon", "wall", "pole", "table")
+        if way == "table":
+            assert self.table is not None
+            height = TABLE_TOP if self.top is None else self.top
+            return table(*self.table, height=height, **options)
+        top = TOP if self.top is None else self.top
+        return (Solid(self._outline(way), bottom=self.bottom, top=top, **options),)
+
+    def _outline(self, way: str) -> shapely.Polygon:
+        given = getattr(self, way)
+        if way == "wall":
+            return wall(given, thickness=self.thickness)
+        if way == "pole":
+            return pole(*given, radius=self.radius)
+        return box(*given) if way == "box" else polygon(given)
+
+
+class HoleSettings(_Shaped):
+    """One hole in the ground; see `groundmap.simulate.Hole`."""
+
+    depth: float = Field(gt=0, description="how far its floor lies below the ground [m]")
+
+    def hole(self) -> Hole:
+        """Return what the table describes."""
+        given = getattr(self, way := self._pick_given("box", "polygon"))
+        return Hole(box(*given) if way == "box" else polygon(given), depth=self.depth)

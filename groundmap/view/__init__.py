@@ -1,0 +1,1 @@
+"""What one stereo observation gives: rig, features, frames and the ground plane."""

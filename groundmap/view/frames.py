@@ -1,0 +1,129 @@
+"""Rigid transforms and the frames they join.
+
+``T_map_camera`` takes camera coordinates to map coordinates: ``p_map = T_map_camera @ p_camera``,
+adjacent names cancel. ``map`` and ``base_link`` are x forward, y left, z up (REP-103); the camera's
+optical frame is x right, y down, z forward.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from groundmap.arrays import Floats, as_floats, check_finite
+from groundmap.errors import CameraError, InputError
+
+WorldConvention = Literal["optical", "rep103"]
+
+# Columns are the optical axes seen from a REP-103 frame: x right = -y, y down = -z, z forward = x.
+T_REP103_OPTICAL: Floats = np.array(
+    [[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+)
+ORTHONORMAL_TOLERANCE = 1e-4
+
+
+def check_transform(name: str, matrix: npt.ArrayLike) -> Floats:
+    """Return `matrix` as a rigid 4 x 4 transform, or say what keeps it from being one.
+
+    Raises
+    ------
+    CameraError
+        The rotation part is not orthonormal, mirrors, or the last row is not 0 0 0 1.
+    InputError
+        Another shape, or NaN or infinite entries.
+    """
+    transform = as_floats(name, matrix, (4, 4)).copy()  # what is checked is not changed later
+    check_finite(name, transform)
+    rotation = transform[:3, :3]
+    with np.errstate(over="ignore", invalid="ignore"):
+        deviation = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
+    if not deviation <= ORTHONORMAL_TOLERANCE:
+        raise CameraError(
+            name,
+            "a rotation with orthonormal rows",
+            f"rows off by {deviation:.3g}",
+            hint="Check the order of the numbers: row-major, camera to world.",
+        )
+    if np.linalg.det(rotation) < 0:
+        raise CameraError(name, "a rotation", "a reflection (determinant -1)")
+    if not np.allclose(transform[3], (0.0, 0.0, 0.0, 1.0)):
+        raise CameraError(name, "a last row of 0 0 0 1", str(transform[3]))
+    transform.flags.writeable = False
+    return transform
+
+
+def invert(transform: Floats) -> Floats:
+    """Return the inverse of a rigid transform, without a linear solve."""
+    rotation = transform[:3, :3]
+    inverse = np.eye(4)
+    inverse[:3, :3] = rotation.T
+    inverse[:3, 3] = -rotation.T @ transform[:3, 3]
+    return inverse
+
+
+def map_from_world(T_world: Floats, world: WorldConvention) -> Floats:
+    """Turn a pose given in the data's world into the ``map`` frame.
+
+    Raises
+    ------
+    InputError
+        Another world than "optical" or "rep103".
+
+    Examples
+    --------
+    >>> pose = np.eye(4)
+    >>> pose[:3, 3] = 1.0, 2.0, 3.0  # right, down, forward
+    >>> map_from_world(pose, "optical")[:3, 3]
+    array([ 3., -1., -2.])
+    """
+    if world not in get_args(WorldConvention):
+        raise InputError("world", "'optical' or 'rep103'", repr(world))
+    return T_REP103_OPTICAL @ T_world if world == "optical" else T_world
+
+
+def from_quaternion(translation: Floats, quaternion: Floats) -> Floats:
+    """Return the transform of a translation [m] and a unit quaternion (x, y, z, w).
+
+    Raises
+    ------
+    CameraError
+        The quaternion's length is not 1 within 1e-3.
+    """
+    with np.errstate(over="ignore"):
+        length = float(np.linalg.norm(quaternion))
+    if not abs(length - 1.0) <= 1e-3:
+        raise CameraError("quaternion", "length 1 (order x y z w)", f"length {length:.4g}")
+    x, y, z, w = quaternion / length
+    transform = np.eye(4)
+    transform[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    transform[:3, 3] = translation
+    return transform
+
+
+def to_quaternion(transform: Floats) -> Floats:
+    """Return the unit quaternion (x, y, z, w), w >= 0, of a transform's rotation.
+
+    Examples
+    --------
+    >>> to_quaternion(np.eye(4))
+    array([0., 0., 0., 1.])
+    """
+    r = transform[:3, :3]
+    # The eigenvector of this symmetric matrix is stable for every rotation (Bar-Itzhack 2000).
+    k = np.array(
+        [
+            [r[0, 0] - r[1, 1] - r[2, 2], 0.0, 0.0, 0.0],
+            [r[0, 1] + r[1, 0], r[1, 1] - r[0, 0] - r[2, 2], 0.0, 0.0],
+            [r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], r[2, 2] - r[0, 0] - r[1, 1], 0.0],
+            [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], np.trace(r)],
+        ]
+    )
+    _, vectors = np.linalg.eigh(k, UPLO="L")
+    quaternion: Floats = vectors[:, -1]
+    return quaternion * (-1.0 if quaternion[3] < 0 else 1.0) + 0.0  # no negative zeros

@@ -1,0 +1,1 @@
+"""The last check of every route, by code that no planner uses."""

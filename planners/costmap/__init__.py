@@ -1,0 +1,1 @@
+"""The map as a problem sees it: where the footprint fits, and what cells cost."""

@@ -1,0 +1,253 @@
+"""Whether start and goal are places for the footprint."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from scipy import ndimage
+
+from groundmap.arrays import Bools, Floats, Ints
+from planners.costmap.costmap import Costmap
+from planners.costmap.endpoints import centres_around, links
+from planners.costmap.map_space import MapSpace
+from planners.costmap.voxel_map import Voxels
+from planners.error_messages import Place, Point, format_point
+from planners.errors import NonFreeError, OutsideMapError, ProblemError, UnknownSpaceError
+from planners.geometry.kernels.swept_footprint import pose_clear
+from planners.geometry.rounding import rounding_at, slack_at
+from planners.problem.problem import PlanningProblem, Pose
+
+MOST_LOOKUPS = 64  # tiles near a place beyond which all touched tiles are looked at instead
+
+
+def costmap_of(problem: PlanningProblem) -> Costmap:
+    """Return the costmap of a problem on a 2-D map whose start and goal are places for its disc.
+
+    Raises
+    ------
+    ProblemError
+        A 3-D map.
+    OutsideMapError, NonFreeError, UnknownSpaceError
+    """
+    if problem.grid.ndim != 2:
+        raise ProblemError("grid", "a 2-D map", f"one of {problem.grid.ndim}-D")
+    check_on_map(problem)
+    costmap = Costmap.of(problem)
+    check_space(costmap, "start", problem.start_xy)
+    check_space(costmap, "goal", problem.goal_xy)
+    return costmap
+
+
+def check_on_map(problem: PlanningProblem, *, goal: bool = True) -> None:
+    """Check that start and, unless told, goal lie on touched tiles.
+
+    A start whose surroundings are cleared may stand beside them, as long as its footprint (or a
+    cell) reaches them: poses at the border of a tile are off by rounding.
+
+    Raises
+    ------
+    OutsideMapError
+    """
+    grid = problem.grid
+    reach = max(problem.radius, grid.resolution) if problem.clears_its_start else 0.0
+    places: tuple[tuple[Place, Point, float], ...] = (
+        ("start", problem.start_xy, reach),
+        ("goal", problem.goal_xy, 0.0),
+    )
+    for place, xy, margin in places if goal else places[:1]:
+        if not _touches_tile(problem, xy, margin):
+            if not any(True for _ in grid.tiles()):
+                raise OutsideMapError(place, xy, bounds=())
+            space = space_of(replace(problem, clear_start=False))
+            nearest = nearest_place(space, xy, place=place)
+            raise OutsideMapError(place, xy, bounds=tuple(grid.bounds().tolist()), nearest=nearest)
+
+
+def check_space(space: MapSpace, place: Place, pose: Pose, *, headings: bool = False) -> None:
+    """Check that the footprint fits: the state of the place itself comes before what is near.
+
+    Parameters
+    ----------
+    space : Costmap or Voxels
+    place : {"start", "goal"}
+        For the sentence.
+    pose : tuple of float
+        x, y (in 3-D: x, y, z) [m, map] and, if `headings`, yaw [rad].
+    headings : bool, default False
+        Whether an outline is looked at as it is turned, or the disc around it.
+
+    Raises
+    ------
+    NonFreeError, UnknownSpaceError
+    ProblemError
+        A place beyond the part of a large map that is planned on.
+    """
+    xy, yaw = _place_and_yaw(space, pose, headings=headings)
+    _check_in_window(space, place, xy)
+    if _fits(space, space.blocked, xy, yaw):
+        return
+    cell = tuple(np.floor(space.to_cells(xy)[0]).astype(np.int64)[::-1])
+    unknown = space.blocked & ~space.nonfree
+    checks = [(space.nonfree, NonFreeError), (unknown, UnknownSpaceError)]
+    if unknown[cell]:
+        checks.reverse()
+    for blocked, error in checks:
+        if not _fits(space, blocked, xy, yaw):
+            raise error(
+                place,
+                xy,
+                clearance=space.clearance_of(xy, to=blocked),
+                needed=space.radius,
+                nearest=nearest_place(space, xy, place=place, yaw=yaw),
+                yaw=yaw,
+            )
+
+
+def check_start_is_known(space: MapSpace) -> None:
+    """Check that the start, from which no route was found, is no island in unknown space.
+
+    The unknown cells near the start count as free. Where unknown cells alone keep even a point in
+    there, the start lies in unknown space, and is not fenced in.
+
+    Parameters
+    ----------
+    space : Costmap or Voxels
+
+    Raises
+    ------
+    UnknownSpaceError
+    """
+    xy = space.problem.start_xy
+    parts, _ = ndimage.label(~space.blocked)
+    part = parts[tuple(space.window.world_to_cell(xy)[0])]
+    island: Bools = (parts == part) & (part > 0)
+    unknown = space.blocked & ~space.nonfree
+    ends_in_unknown = (ndimage.binary_dilation(island) & unknown).any()
+    if ends_in_unknown and not (island & ~space.cleared).any():
+        raise UnknownSpaceError(
+            "start",
+            xy,
+            clearance=space.clearance_of(xy, to=unknown | space.cleared),
+            needed=space.radius,
+            nearest=nearest_place(space, xy, place="start"),
+        )
+
+
+def nearest_place(
+    space: MapSpace, xy: Point, *, place: Place, yaw: float | None = None
+) -> Point | None:
+    """Return the cell centre nearest to a place where the footprint fits, or None [m, map].
+
+    It is one from which one gets somewhere. Of places for a start, only those count from which
+    the goal can be reached, and the reverse. Where the other end is in no place for the footprint
+    itself, or joined to no cell, only those in the largest connected part of the map count: a
+    problem whose start and goal are both replaced by their nearest places has a route.
+
+    Parameters
+    ----------
+    space : Costmap or Voxels
+    xy : tuple of float [m, map]
+    place : {"start", "goal"}
+        Which end of the problem the place is.
+    yaw : float, optional [rad]
+        The outline fits that is turned so; unless given, the disc around it. Which places an
+        outline can drive between isn't worked out: those count that base_link can.
+    """
+    problem = space.problem
+    free = space.traversable if yaw is None else ~space.blocked
+    other = problem.goal_xy if place == "start" else problem.start_xy
+    radius = space.radius if yaw is None else 0.0
+    cells = np.argwhere(_part_around(space, free, other, radius=radius))
+    centres: Floats = space.window.cell_to_world(cells)
+    away = np.hypot.reduce(centres - xy, axis=1)
+    if yaw is None:
+        return tuple(centres[away.argmin()].tolist()) if len(away) else None
+    for index in np.argsort(away, kind="stable"):
+        centre: Point = tuple(centres[index].tolist())
+        if _fits(space, space.blocked, centre, yaw):
+            return centre
+    return None
+
+
+def _part_around(space: MapSpace, free: Bools, xy: Point, *, radius: float) -> Bools:
+    """Return the cells that are connected to a place; if there are none, the largest part.
+
+    Moves lead over the sides of cells, as all cells that a diagonal move spans are free.
+    """
+    parts, count = ndimage.label(free)
+    around = np.unique(parts[tuple(_cells_around(space, xy, radius=radius).T)])
+    around = around[around > 0]
+    if len(around) == 0 and count > 0:
+        around = np.array([1 + np.bincount(parts.ravel())[1:].argmax()])
+    part: Bools = np.isin(parts, around)
+    return part
+
+
+def _cells_around(space: MapSpace, xy: Point, *, radius: float) -> Ints:
+    """Return the cells that a disc's place is joined to; of a ball's on voxels, those around it."""
+    if isinstance(space, Costmap):
+        return links(space, (xy[0], xy[1]), radius=radius).cells
+    position = space.to_cells(xy)[0][::-1]
+    around = product(*(centres_around(at, 0.0) for at in position.tolist()))
+    cells = np.array(list(around), dtype=np.int64)
+    return cells[space.window.contains(cells)]
+
+
+def _check_in_window(space: MapSpace, place: Place, xy: Point) -> None:
+    """Check that a place is on the part of the map that is planned on."""
+    window = space.window
+    if not window.contains(window.world_to_cell(xy))[0]:
+        raise ProblemError(
+            place,
+            "a place on the part of the map that is planned on, as the whole has too many cells",
+            format_point(xy),
+            hint="Plan to and from other parts on their own.",
+        )
+
+
+def _place_and_yaw(space: MapSpace, pose: Pose, *, headings: bool) -> tuple[Point, float | None]:
+    ndim = space.blocked.ndim
+    turned = headings and not space.problem.shape.is_disc and len(pose) > ndim
+    return pose[:ndim], pose[ndim] if turned else None
+
+
+def _fits(space: MapSpace, blocked: Bools, xy: Point, yaw: float | None) -> bool:
+    polygon = space.problem.shape.polygon
+    position = space.to_cells(xy)[0]
+    if yaw is None or polygon is None:
+        cell = tuple(np.floor(position).astype(np.int64)[::-1])
+        least = space.radius - slack_at(xy)
+        return not blocked[cell] and space.clearance_of(xy, to=blocked, limit=space.radius) >= least
+    x, y = position.tolist()
+    size = space.window.resolution
+    touch = slack_at(xy) / size
+    return bool(pose_clear(blocked, polygon / size, x, y, math.cos(yaw), math.sin(yaw), touch))
+
+
+def space_of(problem: PlanningProblem) -> Costmap | Voxels:
+    """Return the map as a problem sees it: a costmap, or voxels."""
+    return Costmap.of(problem) if problem.grid.ndim == 2 else Voxels.of(problem)
+
+
+def _touches_tile(problem: PlanningProblem, xy: Point, margin: float) -> bool:
+    """Whether a touched tile comes within a margin [m] of a place, up to rounding."""
+    grid = problem.grid
+    side = grid.tile_shape[0] * grid.resolution
+    position = ((np.array(xy) - grid.origin) / side)[::-1]
+    reach = (margin + rounding_at(xy)) / side
+    ranges = [
+        range(math.ceil(at - reach) - 1, math.floor(at + reach) + 1) for at in position.tolist()
+    ]
+    indices: Iterable[tuple[int, ...]] = (index for index, _ in grid.tiles())
+    if math.prod(each.stop - each.start for each in ranges) <= MOST_LOOKUPS:
+        indices = product(*ranges)
+    for index in indices:
+        first = np.array(index)
+        away = np.maximum(np.maximum(first - position, position - first - 1), 0.0)
+        if math.hypot(*away) <= reach and grid.has_tile(index):
+            return True
+    return False

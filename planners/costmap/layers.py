@@ -1,0 +1,85 @@
+"""What the cells of a window are to a problem: blocked, how far from that, how dear."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from groundmap.arrays import Bools, Bytes, Floats, Ints32
+from groundmap.grid.window import CellState, GridWindow
+from planners.costmap.kernels.distance import NOWHERE, squared_distances
+from planners.costmap.moves import squared_need
+from planners.geometry.rounding import slack_at
+from planners.problem.costs import (
+    INSCRIBED_INFLATED_OBSTACLE,
+    LETHAL_OBSTACLE,
+    NO_INFORMATION,
+    cell_costs,
+)
+from planners.problem.problem import PlanningProblem
+
+
+class Layers(NamedTuple):
+    """Arrays of shape (rows, cols), described at `planners.costmap.costmap.Costmap`."""
+
+    blocked: Bools
+    nonfree: Bools
+    cleared: Bools
+    squared: Ints32
+    costs: Bytes
+
+
+def layers_of(problem: PlanningProblem, window: GridWindow) -> Layers:
+    """Return the layers of a window; what lies outside it counts as not blocked."""
+    states = window.states(epsilon=problem.epsilon)
+    nonfree = states == CellState.NONFREE
+    cleared = near_start(problem, window) & (states == CellState.UNKNOWN)
+    free = (states == CellState.FREE) | cleared
+    blocked = ~free if problem.avoids_unknown else nonfree
+    squared = squared_distances(blocked, cap(problem))
+    costs = np.zeros(squared.shape, dtype=np.uint8)
+    penalise = problem.unknown == "penalise"
+    if problem.costs.top(penalise=penalise) > 0:
+        costs = cell_costs(
+            problem.costs,
+            metres(squared, window.resolution),
+            window.confidence,
+            free,
+            radius=problem.radius,
+            penalise=penalise,
+        )
+    costs[squared < squared_need(problem.radius, window.resolution)] = INSCRIBED_INFLATED_OBSTACLE
+    costs[blocked] = NO_INFORMATION
+    costs[nonfree] = LETHAL_OBSTACLE
+    return Layers(blocked, nonfree, cleared, squared, costs)
+
+
+def cap(problem: PlanningProblem) -> int:
+    """Return the squared distance beyond which nothing changes [(half cells)²]."""
+    farthest = max(problem.radius, problem.costs.reach)
+    return min(squared_need(farthest, problem.grid.resolution), NOWHERE)
+
+
+def metres(squared: Ints32, resolution: float) -> Floats:
+    """Return distances [m] of squared ones in half cells."""
+    return np.where(squared == NOWHERE, np.inf, np.sqrt(squared) * (resolution / 2.0))
+
+
+def near_start(problem: PlanningProblem, window: GridWindow) -> Bools:
+    """Return which cells' squares (cubes) come within the clear radius of the cleared place."""
+    near = np.zeros(window.count.shape, dtype=np.bool_)
+    if not problem.clear_start:
+        return near
+    position = ((np.array(problem.clear_place) - window.origin) / window.resolution)[::-1]
+    reach = problem.clear_radius + slack_at(problem.clear_place)
+    cells = reach / window.resolution + 1.0
+    first = np.clip(np.floor(position - cells), 0, near.shape).astype(np.int64)
+    last = np.clip(np.ceil(position + cells), 0, near.shape).astype(np.int64)
+    squared = np.zeros((1,) * near.ndim)
+    for axis, at in enumerate(position):
+        lower = np.arange(first[axis], last[axis])
+        gaps = np.maximum(np.maximum(lower - at, at - lower - 1), 0.0)
+        squared = squared + np.expand_dims(gaps**2, [k for k in range(near.ndim) if k != axis])
+    near[tuple(map(slice, first, last))] = np.sqrt(squared) * window.resolution <= reach
+    return near

@@ -1,0 +1,1 @@
+"""Lines, curves and swept footprints among blocked cells, without a map."""

@@ -1,0 +1,1 @@
+"""Numba kernels of clearance, curves and swept footprints."""

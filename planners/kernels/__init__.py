@@ -1,1 +1,0 @@
-"""The inner loops, compiled by numba: plain arrays in, plain arrays out."""

@@ -1,0 +1,1 @@
+"""What is asked of a planner: start, goal, footprint, costs."""

@@ -1,0 +1,173 @@
+"""What is asked of a planner."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass
+from typing import Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from groundmap.arrays import Floats, is_number
+from groundmap.grid.grid import ConfidenceGrid
+from groundmap.grid.window import EPSILON
+from planners.error_messages import Point
+from planners.errors import ProblemError
+from planners.problem.costs import CostSettings
+from planners.problem.footprint import LARGEST, Footprint
+
+Pose = tuple[float, ...]  #: x, y [m, map] and, where the planner heeds it, yaw [rad]
+
+PLAIN = CostSettings()  # the shortest route is the best
+Unknown = Literal["avoid", "allow", "penalise"]
+
+
+@dataclass(frozen=True)
+class PlanningProblem:
+    """From where to where, with which footprint, on which map.
+
+    Parameters
+    ----------
+    grid : ConfidenceGrid
+        A map, 2-D or 3-D.
+    start, goal : sequence of float
+        x, y (in 3-D: x, y, z) [m, map] and optionally yaw [rad].
+    footprint : float or array_like, shape (n, 2)
+        Radius of the robot [m], or the corners of its outline [m, base_link]. Planners that know
+        no heading keep the distance of a disc that holds the outline at every heading.
+    unknown : {"avoid", "allow", "penalise"}
+        Whether unknown and contested cells may lie under the swept footprint; penalised, they may,
+        at a cost (``costs.unknown_weight``).
+    costs : CostSettings, optional
+        What else makes a metre dear; nothing unless told.
+    clear_start : bool, default True
+        Whether *unknown* cells near the start count as free; non-free and contested ones never do.
+        `Route.start_unknown_area` says how many of them a route needs, `Route.known_clearance` how
+        near it comes to them.
+    clear_start_radius : float [m], optional
+        Cells are near whose square comes within this distance of the start. Unless told it is the
+        footprint's radius and half its width: of a disc, twice the radius. (What a forward camera
+        sees next to itself is a wedge narrower than the footprint: with only the cells under the
+        footprint cleared, the disc could never leave.)
+    cleared_at : sequence of float, optional
+        Where the cells are that clear_start clears, if not around the start: x, y (in 3-D:
+        x, y, z) [m, map]. Of many problems on one map, each has them in the same place.
+    epsilon : float, default 0.01
+        Cells of a smaller absolute confidence are contested.
+
+    Raises
+    ------
+    ProblemError
+        A place that is not 2 or 3 finite numbers (in 3-D: 3 or 4), a footprint that is neither a
+        radius of 0 or more nor a simple polygon, no grid, an option out of its range.
+
+    Examples
+    --------
+    >>> problem = PlanningProblem(ConfidenceGrid(), start=(0, 0), goal=(60, 4), footprint=0.9)
+    >>> problem.goal, problem.clear_radius
+    ((60.0, 4.0), 1.8)
+    >>> PlanningProblem(ConfidenceGrid(), start=(0, float("nan")), goal=(60, 4), footprint=0.9)
+    Traceback (most recent call last):
+        ...
+    planners.errors.ProblemError: start: expected x, y [m] and optionally yaw [rad], all finite, \
+got (0, nan).
+    """
+
+    grid: ConfidenceGrid
+    _: KW_ONLY
+    start: Sequence[float] | Floats
+    goal: Sequence[float] | Floats
+    footprint: Footprint | float | npt.ArrayLike
+    unknown: Unknown = "avoid"
+    costs: CostSettings = PLAIN
+    clear_start: bool = True
+    clear_start_radius: float | None = None
+    cleared_at: Sequence[float] | Floats | None = None
+    epsilon: float = EPSILON
+
+    def __post_init__(self) -> None:
+        """Check every value, and turn numbers into floats."""
+        if not isinstance(self.grid, ConfidenceGrid):
+            raise ProblemError("grid", "a ConfidenceGrid", repr(self.grid))
+        if not isinstance(self.costs, CostSettings):
+            raise ProblemError("costs", "CostSettings", repr(self.costs))
+        object.__setattr__(self, "start", _pose("start", self.start, self.grid.ndim))
+        object.__setattr__(self, "goal", _pose("goal", self.goal, self.grid.ndim))
+        if not isinstance(self.footprint, Footprint):
+            object.__setattr__(self, "footprint", Footprint.of(self.footprint))
+        if self.grid.ndim == 3 and not self.shape.is_disc:
+            raise ProblemError("footprint", "a radius, on a 3-D map", "a polygon")
+        if self.clear_start_radius is not None:
+            radius = _radius("clear_start_radius", self.clear_start_radius)
+            object.__setattr__(self, "clear_start_radius", radius)
+        if self.cleared_at is not None:
+            place = _pose("cleared_at", self.cleared_at, self.grid.ndim)
+            object.__setattr__(self, "cleared_at", place)
+        if not isinstance(self.unknown, str) or self.unknown not in get_args(Unknown):
+            expected = "'avoid', 'allow' or 'penalise'"
+            raise ProblemError("unknown", expected, repr(self.unknown))
+        if not isinstance(self.clear_start, bool):
+            raise ProblemError("clear_start", "True or False", repr(self.clear_start))
+        if not (is_number(self.epsilon) and 0 < self.epsilon < 1):
+            raise ProblemError("epsilon", "a number between 0 and 1", repr(self.epsilon))
+
+    @property
+    def shape(self) -> Footprint:
+        """The footprint, whatever it was given as."""
+        assert isinstance(self.footprint, Footprint)
+        return self.footprint
+
+    @property
+    def radius(self) -> float:
+        """Radius of the disc that holds the footprint at every heading [m]."""
+        return self.shape.radius
+
+    @property
+    def avoids_unknown(self) -> bool:
+        """Whether unknown and contested cells are as bad as non-free ones."""
+        return self.unknown == "avoid"
+
+    @property
+    def start_xy(self) -> Point:
+        """x, y of the start (on a 3-D map also z) [m, map]."""
+        return tuple(map(float, self.start[: self.grid.ndim]))
+
+    @property
+    def goal_xy(self) -> Point:
+        """x, y of the goal (on a 3-D map also z) [m, map]."""
+        return tuple(map(float, self.goal[: self.grid.ndim]))
+
+    @property
+    def clear_place(self) -> Point:
+        """Where unknown cells count as free: x, y (in 3-D: x, y, z) [m, map]."""
+        place = self.start if self.cleared_at is None else self.cleared_at
+        return tuple(map(float, place[: self.grid.ndim]))
+
+    @property
+    def clears_its_start(self) -> bool:
+        """Whether unknown cells around the very start count as free."""
+        return self.clear_start and self.clear_place == self.start_xy
+
+    @property
+    def clear_radius(self) -> float:
+        """How near unknown cells come to the start that count as free [m]."""
+        if self.clear_start_radius is None:
+            return self.radius + self.shape.width / 2.0
+        return self.clear_start_radius
+
+
+def _pose(name: str, values: Sequence[float] | Floats, ndim: int) -> tuple[float, ...]:
+    axes = "x, y" if ndim == 2 else "x, y, z"
+    expected = f"{axes} [m] and optionally yaw [rad], all finite"
+    places = isinstance(values, np.ndarray) and values.ndim == 1
+    places |= isinstance(values, Sequence) and not isinstance(values, str)
+    if not places or len(values) not in (ndim, ndim + 1) or not all(map(is_number, values)):
+        raise ProblemError(name, expected, repr(values))
+    return tuple(map(float, values))
+
+
+def _radius(name: str, value: float) -> float:
+    if not (is_number(value) and 0 <= value <= LARGEST):
+        raise ProblemError(name, f"a radius from 0 to {LARGEST:g} [m]", repr(value))
+    return float(value)

@@ -1,0 +1,1 @@
+"""Routes: measured, audited, shortened, smoothed and written to files."""

@@ -1,0 +1,313 @@
+"""A collision-free path, with what it costs and how sure it is."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from os import PathLike
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+import shapely
+import yaml
+
+from groundmap.arrays import Bools, Floats
+from groundmap.errors import InputError
+from groundmap.files.archive import write_atomically
+from planners.costmap.map_space import MapSpace
+from planners.geometry.polyline import CrossedCells, cross_cells, distances_to, length_of
+from planners.problem.problem import PlanningProblem
+from planners.search.base import SearchResult
+from planners.search.graph import Graph
+
+
+@dataclass(frozen=True, eq=False)
+class Route:
+    """A route that a planner found and the audit passed.
+
+    Attributes
+    ----------
+    waypoints : ndarray, shape (n, 2), n >= 2 [m, map]
+        Start, turning points, goal; exactly collinear points are merged. On a 3-D map of shape
+        (n, 3).
+    headings : ndarray, shape (n,) [rad, map]
+        Where the robot looks at each waypoint: as the planner decided, else along the next piece
+        (at the goal: the yaw asked for, or along the last piece).
+    length : float [m]
+    cost : float [m]
+        What the planner minimised: the length, where the problem says so with dear metres counted
+        more, cell by cell; of sampling planners, what their weights say, along the line.
+    bound : float or None
+        The cost is at most this many times the least that the planner could have found; None if
+        it knows no bound.
+    min_clearance : float [m]
+        Distance of the line to the nearest cell it must not touch (its square), exact; infinite
+        on a map without such cells.
+    known_clearance : float [m]
+        As `min_clearance`, but to the unknown cells near the start as well that count as free:
+        what is kept for sure. It is smaller where the line comes near to such cells, and 0 where
+        it crosses one.
+    mean_clearance : float [m]
+        Mean along the line of the clearance at the centres of the cells it crosses.
+    min_confidence, mean_confidence : float
+        Confidence of being free, which is minus the grid's confidence: 1 is surely free, 0 is
+        unknown. Of the least sure cell that the line crosses; mean along the line.
+    unknown_length : float [m]
+        Length of the line in cells of which nothing is known.
+    start_unknown_area : float [m²; on a 3-D map m³]
+        Area of the unknown cells that counted as free because they are near the start and that
+        the route really uses: their centre comes under the footprint, or the line crosses them.
+    planner : str
+    expanded : int
+        Nodes that the search expanded.
+    seconds : float [s]
+        Wall time of the checks, the costmap and the search.
+    frame : str
+        Frame of the waypoints.
+    audit : str
+        "clean": a route that the audit refuses is never handed out; "skipped" where
+        `planners.plan_many` was told to do without.
+    graph : planners.search.graph.Graph or None
+        The tree or roadmap that it was found in, if a sampling planner was told to keep it; files
+        leave it out.
+    """
+
+    waypoints: Floats
+    headings: Floats
+    length: float
+    cost: float
+    bound: float | None
+    min_clearance: float
+    known_clearance: float
+    mean_clearance: float
+    min_confidence: float
+    mean_confidence: float
+    unknown_length: float
+    start_unknown_area: float
+    planner: str
+    expanded: int
+    seconds: float
+    frame: str
+    audit: str = "clean"
+    graph: Graph | None = None
+
+    @classmethod
+    def along(cls, space: MapSpace, result: SearchResult, *, planner: str, seconds: float) -> Route:
+        """Return the route that a planner found, measured on the map.
+
+        Parameters
+        ----------
+        space : Costmap or Voxels
+        result : SearchResult
+        planner, seconds
+            As in the attributes.
+        """
+        waypoints = result.waypoints
+        line = cross_cells(space.to_cells(waypoints))
+        at = tuple(line.cells.T)
+        sureness = -space.window.confidence[at].astype(np.float64)
+        unknown = space.window.count[at] == 0
+        length, clearance = length_of(waypoints), space.clearance_of(waypoints)
+        headings = result.headings
+        return cls(
+            waypoints=waypoints,
+            headings=_headings(waypoints, space.problem) if headings is None else headings,
+            length=length,
+            cost=length if result.cost is None else result.cost,
+            bound=result.bound,
+            min_clearance=clearance,
+            known_clearance=_known_clearance(space, waypoints, clearance),
+            mean_clearance=_mean(space.clearance_at(line.cells), line.lengths),
+            min_confidence=float(sureness.min()) + 0.0,  # + 0.0: an unknown cell's -0.0 is 0.0
+            mean_confidence=_mean(sureness, line.lengths) + 0.0,
+            unknown_length=float(line.lengths[unknown].sum()) * space.window.resolution,
+            start_unknown_area=_start_unknown_area(space, result, line),
+            planner=planner,
+            expanded=result.expanded,
+            seconds=seconds,
+            frame=space.problem.grid.frame,
+            graph=result.graph,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all fields but the graph as plain values; an infinite clearance as None."""
+        names = [field.name for field in fields(self) if field.name != "graph"]
+        values = {name: getattr(self, name) for name in names}
+        values["waypoints"] = self.waypoints.tolist()
+        values["headings"] = self.headings.tolist()
+        for name in ("min_clearance", "known_clearance", "mean_clearance"):
+            values[name] = values[name] if math.isfinite(values[name]) else None
+        return values
+
+    def to_geojson(self) -> dict[str, Any]:
+        """Return a GeoJSON Feature: a LineString [m, map], the other fields as properties."""
+        properties = self.to_dict()
+        coordinates = properties.pop("waypoints")
+        geometry = {"type": "LineString", "coordinates": coordinates}
+        return {"type": "Feature", "geometry": geometry, "properties": properties}
+
+    def to_path(self) -> dict[str, Any]:
+        """Return a dict that looks like ROS's nav_msgs/Path: poses with quaternions [map].
+
+        Examples
+        --------
+        >>> from groundmap import ConfidenceGrid
+        >>> from planners import PlanningProblem, plan
+        >>> grid = ConfidenceGrid(resolution=0.5)
+        >>> grid.fuse(np.array([0, 0]), np.full((64, 64), -1.0, dtype=np.float32))
+        >>> route = plan(PlanningProblem(grid, start=(2.25, 2.25), goal=(2.25, 6), footprint=0.9))
+        >>> pose = route.to_path()["poses"][0]["pose"]
+        >>> pose["position"], round(pose["orientation"]["z"], 3)
+        ({'x': 2.25, 'y': 2.25, 'z': 0.0}, 0.707)
+        """
+        header = {"frame_id": self.frame, "stamp": {"sec": 0, "nanosec": 0}}
+        poses = [
+            {
+                "header": header,
+                "pose": {
+                    "position": dict(zip("xyz", [*place, 0.0], strict=False)),
+                    "orientation": _quaternion(yaw),
+                },
+            }
+            for place, yaw in zip(self.waypoints.tolist(), self.headings.tolist(), strict=True)
+        ]
+        return {"header": header, "poses": poses}
+
+    def to_csv(self) -> str:
+        """Return a line per waypoint: x, y (and z) [m], yaw [rad], distance along the route [m]."""
+        steps = np.linalg.norm(np.diff(self.waypoints, axis=0), axis=1)
+        along = np.append(0.0, np.cumsum(steps))
+        table = np.column_stack([self.waypoints, self.headings, along])
+        lines = [",".join(map(repr, row)) for row in table.tolist()]
+        axes = ",".join("xyz"[: self.waypoints.shape[1]])
+        return "\n".join([f"{axes},yaw,distance", *lines, ""])
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the route to a file, all or nothing; the name's ending says how.
+
+        ``.geojson`` or ``.json``: a GeoJSON Feature; ``.csv``: see `to_csv`; ``.yaml``: see
+        `to_path`, as ``ros2 topic pub`` takes it.
+
+        Raises
+        ------
+        InputError
+            Another ending.
+        OSError
+            The folder does not exist or can't be written to.
+        """
+        check_route_file(path)
+        _write(path, WRITERS[Path(path).suffix.lower()](self))
+
+    def save_geojson(self, path: str | PathLike[str]) -> None:
+        """Write the GeoJSON Feature to a file, all or nothing.
+
+        Raises
+        ------
+        OSError
+            The folder does not exist or can't be written to.
+        """
+        _write(path, _geojson(self))
+
+
+def check_route_file(path: str | PathLike[str]) -> None:
+    """Check that a route can be written to a file of that name.
+
+    Raises
+    ------
+    InputError
+        Another ending than `WRITERS` has.
+    """
+    if Path(path).suffix.lower() not in WRITERS:
+        expected = f"a name that ends in {', '.join(WRITERS)}"
+        raise InputError("path", expected, repr(str(path)))
+
+
+def _geojson(route: Route) -> str:
+    return json.dumps(route.to_geojson(), indent=2) + "\n"
+
+
+class _PlainDumper(yaml.SafeDumper):
+    """Writes what comes twice twice, as not every reader knows YAML's references."""
+
+    def ignore_aliases(self, data: object) -> bool:
+        return True
+
+
+def _path_yaml(route: Route) -> str:
+    return yaml.dump(route.to_path(), Dumper=_PlainDumper, sort_keys=False)
+
+
+WRITERS: dict[str, Callable[[Route], str]] = {
+    ".geojson": _geojson,
+    ".json": _geojson,
+    ".csv": Route.to_csv,
+    ".yaml": _path_yaml,
+    ".yml": _path_yaml,
+}
+
+
+def _write(path: str | PathLike[str], text: str) -> None:
+    def write(stream: IO[bytes]) -> None:
+        stream.write(text.encode())
+
+    write_atomically(path, write)
+
+
+def _headings(waypoints: Floats, problem: PlanningProblem) -> Floats:
+    """Return where a robot looks that drives along a line; standing, as it was asked to."""
+    dx, dy = np.diff(waypoints, axis=0).T[:2]
+    headings = np.arctan2(dy, dx)
+    ndim = problem.grid.ndim
+    if not (dx.any() or dy.any()) and len(problem.start) > ndim:
+        headings[:] = problem.start[ndim]
+    last = problem.goal[ndim] if len(problem.goal) > ndim else headings[-1]
+    return np.append(headings, last)
+
+
+def _quaternion(yaw: float) -> dict[str, float]:
+    return {"x": 0.0, "y": 0.0, "z": math.sin(yaw / 2.0), "w": math.cos(yaw / 2.0)}
+
+
+def _mean(values: Floats, weights: Floats) -> float:
+    """Return the weighted mean; of a single point, its value."""
+    if weights.sum() == 0:
+        return float(values[0])
+    return float(np.average(values, weights=weights))
+
+
+def _known_clearance(space: MapSpace, waypoints: Floats, clearance: float) -> float:
+    """Return the distance to what is blocked or unknown but cleared, given that to the former."""
+    if not space.problem.avoids_unknown or not space.cleared.any():
+        return clearance
+    return min(clearance, space.clearance_of(waypoints, to=space.cleared, limit=clearance))
+
+
+def _start_unknown_area(space: MapSpace, result: SearchResult, line: CrossedCells) -> float:
+    if not space.cleared.any():
+        return 0.0
+    centres = space.window.cell_to_world(np.argwhere(space.cleared))
+    used = np.zeros_like(space.cleared)
+    used[space.cleared] = _cover(space, result, centres)
+    used[tuple(line.cells.T)] = True
+    cells = float((used & space.cleared).sum())
+    return cells * space.window.resolution**space.cleared.ndim
+
+
+def _cover(space: MapSpace, result: SearchResult, places: Floats) -> Bools:
+    """Return which places come under the footprint: the outline as it is turned, or the disc."""
+    polygon = space.problem.shape.polygon
+    if result.headings is None or polygon is None:
+        return distances_to(places, result.waypoints) <= space.radius
+    covered = np.zeros(len(places), dtype=np.bool_)
+    outline = shapely.Polygon(polygon)
+    shapely.prepare(outline)
+    low, high = places.min(axis=0) - space.radius, places.max(axis=0) + space.radius
+    near = ((result.waypoints >= low) & (result.waypoints <= high)).all(axis=1)
+    for xy, yaw in zip(result.waypoints[near], result.headings[near].tolist(), strict=True):
+        x, y = (places - xy).T
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        covered |= shapely.intersects_xy(outline, cos * x + sin * y, cos * y - sin * x)
+    return covered

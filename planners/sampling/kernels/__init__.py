@@ -1,0 +1,1 @@
+"""Numba kernels that check and measure edges between sampled states."""

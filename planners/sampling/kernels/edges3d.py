@@ -1,0 +1,240 @@
+"""Whether a ball keeps clear along straight lines between voxels, each checked as a whole.
+
+As in `planners.geometry.kernels.clearance3d`, positions in voxels are (x, y, z), and voxel
+[layer, row, col] is the closed cube from (col, row, layer) to (col + 1, row + 1, layer + 1).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from groundmap.arrays import Bools, Ints, Ints32
+from planners.costmap.kernels.distance import NOWHERE, envelope, squared_distances
+
+NEAR = 0.2  # [voxels] room below which a line is checked exactly instead of stepped along
+PIECE = 1.0  # [voxels] longest piece of a line that is checked exactly
+HALVINGS = 64  # of a line, before its pieces are short: no float is that long
+
+
+@njit(cache=True, nogil=True)
+def all_squared_distances(blocked: Bools) -> Ints32:
+    """Return the squared distance of every voxel's centre to the nearest blocked cube.
+
+    Layer by layer as in the plane, then along the columns of layers, whose cubes begin
+    2 k - 1 half voxels away just as squares do.
+
+    Parameters
+    ----------
+    blocked : ndarray of bool, shape (layers, rows, cols)
+
+    Returns
+    -------
+    ndarray of int32, shape (layers, rows, cols) [(half voxels)²]
+        0 for what is blocked, and only for that; `NOWHERE` if nothing is.
+    """
+    layers, rows, cols = blocked.shape
+    squared = np.empty((layers, rows, cols), dtype=np.int32)
+    for layer in range(layers):
+        squared[layer] = squared_distances(blocked[layer], NOWHERE)
+    within = np.empty((cols, layers), dtype=np.int64)
+    room = layers + 1
+    border, at = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
+    starts = np.empty(room, dtype=np.int64)
+    for row in range(rows):
+        for layer in range(layers):
+            for col in range(cols):
+                within[col, layer] = squared[layer, row, col]
+        for col in range(cols):
+            _along(within[col], border, at, starts)
+        for layer in range(layers):
+            for col in range(cols):
+                squared[layer, row, col] = within[col, layer]
+    return squared
+
+
+@njit(cache=True, nogil=True)
+def _along(within: Ints, border: Ints, at: Ints, starts: Ints) -> None:
+    """Turn squared distances within layers into those over all layers."""
+    size, k = envelope(within, border, at, starts), 0
+    for layer in range(len(within)):
+        x = 2 * layer + 1
+        if size > 0:
+            while k + 1 < size and starts[k + 1] <= x:
+                k += 1
+            away = x - at[k]
+            within[layer] = min(within[layer], away * away + border[k])
+        within[layer] = min(within[layer], NOWHERE)
+
+
+@njit(cache=True, nogil=True)
+def line_clear(
+    squared: Ints32,
+    size: float,
+    radius: float,
+    slack: float,
+    ax: float,
+    ay: float,
+    az: float,
+    bx: float,
+    by: float,
+    bz: float,
+) -> bool:
+    """Whether a ball, moved along the straight line from a to b, overlaps no blocked cube.
+
+    The distance field vouches for as much of the line, to both sides of its middle, as there is
+    room beyond the radius; what is left of either half is looked at likewise. Where that is no
+    help, the exact distance to the cubes decides.
+
+    Parameters
+    ----------
+    squared : ndarray of int32, shape (layers, rows, cols)
+        As of `all_squared_distances`.
+    size : float [m]
+        Of a voxel.
+    radius : float [m]
+    slack : float [m]
+        Shortfall of the radius that is put down to rounding.
+    ax, ay, az, bx, by, bz : float [m]
+        From the map's outer corner.
+    """
+    x, y, z = ax / size, ay / size, az / size
+    dx, dy, dz = bx / size - x, by / size - y, bz / size - z
+    if not (_within(squared, x, y, z) and _within(squared, bx / size, by / size, bz / size)):
+        return False
+    need = max(radius / size, 2.0 * slack / size)
+    least = need - slack / size
+    for s in (1.0, 0.0):
+        if _nearness(squared, x + s * dx, y + s * dy, z + s * dz)[1] < least:
+            return False
+    length = math.sqrt(dx * dx + dy * dy + dz * dz)
+    share = 1.0 / length if length > 0.0 else 0.0
+    left = np.empty((HALVINGS, 2))  # parts of the line that are still to be looked at
+    left[0, 0], left[0, 1] = 0.0, length
+    count = 1
+    while count > 0:
+        count -= 1
+        begin, end = left[count]
+        half, middle = (end - begin) / 2.0, (begin + end) / 2.0
+        s = middle * share
+        low, high = _nearness(squared, x + s * dx, y + s * dy, z + s * dz)
+        if high < least:
+            return False
+        room = low - need
+        if room >= half:
+            continue
+        if end - begin <= PIECE:
+            s, t = begin * share, (end - begin) * share
+            u, v, w = x + s * dx, y + s * dy, z + s * dz
+            if not _piece_clear(squared, u, v, w, t * dx, t * dy, t * dz, least):
+                return False
+            continue
+        if room < NEAR:
+            room = 0.0
+        left[count, 0], left[count, 1] = begin, middle - room
+        left[count + 1, 0], left[count + 1, 1] = middle + room, end
+        count += 2
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _within(squared: Ints32, x: float, y: float, z: float) -> bool:
+    layers, rows, cols = squared.shape
+    return bool(0.0 <= x < cols and 0.0 <= y < rows and 0.0 <= z < layers)
+
+
+@njit(cache=True, nogil=True)
+def _nearness(squared: Ints32, x: float, y: float, z: float) -> tuple[float, float]:
+    """Return bounds of the clearance at a point, from that at its voxel's centre.
+
+    Points that rounding moved off the map are told of from the nearest voxel.
+    """
+    layers, rows, cols = squared.shape
+    col = min(max(math.floor(x), 0), cols - 1)
+    row = min(max(math.floor(y), 0), rows - 1)
+    layer = min(max(math.floor(z), 0), layers - 1)
+    at = squared[layer, row, col]
+    u, v, w = x - col - 0.5, y - row - 0.5, z - layer - 0.5
+    off = math.sqrt(u * u + v * v + w * w)
+    clearance = math.inf if at == NOWHERE else 0.5 * math.sqrt(at)
+    return clearance - off, clearance + off
+
+
+@njit(cache=True, nogil=True)
+def _piece_clear(
+    squared: Ints32,
+    x: float,
+    y: float,
+    z: float,
+    dx: float,
+    dy: float,
+    dz: float,
+    least: float,
+) -> bool:
+    """Whether all blocked cubes are at `least` so far from the line from (x, y, z) on."""
+    layers, rows, cols = squared.shape
+    limit = least * least
+    left, right = min(x, x + dx), max(x, x + dx)
+    low, high = min(y, y + dy), max(y, y + dy)
+    down, up = min(z, z + dz), max(z, z + dz)
+    first, last = max(math.floor(left - least), 0), min(math.floor(right + least), cols - 1)
+    for k in range(max(math.floor(down - least), 0), min(math.floor(up + least), layers - 1) + 1):
+        along_z = max(k - up, down - k - 1.0, 0.0)
+        for j in range(
+            max(math.floor(low - least), 0), min(math.floor(high + least), rows - 1) + 1
+        ):
+            along_y = max(j - high, low - j - 1.0, 0.0)
+            beside = along_z * along_z + along_y * along_y
+            if beside >= limit:
+                continue
+            for i in range(first, last + 1):
+                if squared[k, j, i] == 0:
+                    along_x = max(i - right, left - i - 1.0, 0.0)
+                    if (
+                        beside + along_x * along_x < limit
+                        and _cube_squared(x - i, y - j, z - k, dx, dy, dz) < limit
+                    ):
+                        return False
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _cube_squared(x: float, y: float, z: float, dx: float, dy: float, dz: float) -> float:
+    """Return the squared distance of the line from (x, y, z) on to the unit cube at the origin.
+
+    Along the line it is convex; its slope is linear between the places where a coordinate passes
+    a border of the cube. Each of these narrows down where the slope changes sign.
+    """
+    begin, end = 0.0, 1.0
+    falls, rises = _slope(x, y, z, dx, dy, dz, 0.0), _slope(x, y, z, dx, dy, dz, 1.0)
+    if falls >= 0.0:
+        t = 0.0
+    elif rises <= 0.0:
+        t = 1.0
+    else:
+        for position, step in ((x, dx), (y, dy), (z, dz)):
+            for border in (0.0, 1.0):
+                t = (border - position) / step if step != 0.0 else begin
+                if begin < t < end:
+                    slope = _slope(x, y, z, dx, dy, dz, t)
+                    if slope < 0.0:
+                        begin, falls = t, slope
+                    else:
+                        end, rises = t, slope
+        t = begin + (end - begin) * falls / (falls - rises)
+    u, v, w = _gap(x + t * dx), _gap(y + t * dy), _gap(z + t * dz)
+    return u * u + v * v + w * w
+
+
+@njit(cache=True, nogil=True)
+def _slope(x: float, y: float, z: float, dx: float, dy: float, dz: float, t: float) -> float:
+    """Return half the slope of the squared distance to the unit cube."""
+    return dx * _gap(x + t * dx) + dy * _gap(y + t * dy) + dz * _gap(z + t * dz)
+
+
+@njit(cache=True, nogil=True)
+def _gap(position: float) -> float:
+    """Return how far a coordinate is beyond the unit interval: negative below it."""
+    return min(position, 0.0) + max(position - 1.0, 0.0)

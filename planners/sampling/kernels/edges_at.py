@@ -1,0 +1,64 @@
+"""The checks of `planners.sampling.kernels.edges`, for callers that keep the `Body` in a table.
+
+Each takes the address of that table (see `planners.sampling.kernels.addresses`) and the numbers of
+two states. They hold on to the interpreter's lock: to let go of it takes about as long as an
+answer.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+from groundmap.arrays import Bools, Floats, Ints
+from planners.sampling.kernels.addresses import bools_at, floats_at, ints_at
+from planners.sampling.kernels.edges import ARM, RADIUS, SIZE, TOUCH, Body, curve_clear, slide_clear
+from planners.sampling.kernels.lines import line_clear
+
+# Where the table has the fields of `Body`.
+BLOCKED, BEFORE, CLEARANCE, CORNERS, BEGINS, DISCS, NUMBERS = range(len(Body._fields))
+
+
+@njit(cache=True)
+def line_clear_at(table: int, ax: float, ay: float, bx: float, by: float) -> bool:
+    """Whether `line_clear`, for the smallest disc about base_link that holds the footprint."""
+    numbers = floats_at(table, NUMBERS)
+    size, radius = numbers[SIZE, 0], numbers[RADIUS, 0] + numbers[ARM, 0]  # one of these is 0
+    blocked, clearance = bools_at(table, BLOCKED), floats_at(table, CLEARANCE)
+    return line_clear(blocked, clearance, size, radius, numbers[TOUCH, 0], ax, ay, bx, by)
+
+
+@njit(cache=True)
+def slide_clear_at(
+    table: int, ax: float, ay: float, a: float, bx: float, by: float, b: float
+) -> bool:
+    """Whether `slide_clear`."""
+    return slide_clear(*_body_at(table), ax, ay, a, bx, by, b)
+
+
+@njit(cache=True)
+def dubins_clear_at(
+    table: int, ax: float, ay: float, a: float, bx: float, by: float, b: float
+) -> bool:
+    """Whether `curve_clear`, forward."""
+    return curve_clear(True, *_body_at(table), ax, ay, a, bx, by, b)
+
+
+@njit(cache=True)
+def reeds_shepp_clear_at(
+    table: int, ax: float, ay: float, a: float, bx: float, by: float, b: float
+) -> bool:
+    """Whether `curve_clear`, both ways."""
+    return curve_clear(False, *_body_at(table), ax, ay, a, bx, by, b)
+
+
+@njit(cache=True)
+def _body_at(table: int) -> tuple[Bools, Ints, Floats, Floats, Ints, Floats, Floats]:
+    return (
+        bools_at(table, BLOCKED),
+        ints_at(table, BEFORE),
+        floats_at(table, CLEARANCE),
+        floats_at(table, CORNERS),
+        ints_at(table, BEGINS).ravel(),
+        floats_at(table, DISCS),
+        floats_at(table, NUMBERS).ravel(),
+    )

@@ -1,0 +1,1 @@
+"""Searches over cells, meshes and poses; they bring back waypoints."""

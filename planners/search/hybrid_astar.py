@@ -1,0 +1,254 @@
+"""Hybrid A*: routes that a robot can steer, for a footprint that turns with it."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from groundmap.arrays import Floats, Ints
+from planners.costmap.costmap import Costmap
+from planners.costmap.swept_footprint import ground_of, shape_of
+from planners.error_messages import Place
+from planners.errors import ProblemError
+from planners.geometry.kernels.curves import wrap
+from planners.geometry.kernels.swept_footprint import step_clear
+from planners.problem.problem import Pose
+from planners.search.base import Clock, SearchResult, SearchSettings
+from planners.search.hybrid_arrays import empty_nodes, factors_of, field_of, no_shot
+from planners.search.kernels.hybrid_astar import (
+    COUNT,
+    EXHAUSTED,
+    EXPANDED,
+    FOUND,
+    FULL,
+    LAST,
+    STATE_SIZE,
+    Nodes,
+    Shot,
+    advance,
+    begin,
+    drive_along,
+    refile,
+)
+from planners.search.kernels.hybrid_field import seed_field
+from planners.search.kernels.hybrid_motion import ROOT, Drive, Prices, pieces, reach, steering
+
+SLICE = 1000  # expansions between two looks at the clock, at most
+SOON = 0.02  # [s] between two looks, about: an expansion takes microseconds, or milliseconds
+FIRST_ROOM = 1 << 12  # nodes to begin with
+
+
+class HybridAStarSettings(SearchSettings):
+    """What hybrid A* can be told."""
+
+    turning_radius: float = Field(
+        1.0, ge=0.01, le=1000, description="tightest turn of base_link [m]"
+    )
+    motion: Literal["dubins", "reeds_shepp"] = Field(
+        "reeds_shepp", description="forward only (dubins), or backwards too (reeds_shepp)"
+    )
+    reverse_penalty: float = Field(
+        2.0, ge=1, le=100, description="a metre driven backwards counts as that many"
+    )
+    gear_change_penalty: float = Field(
+        0.5,
+        ge=0,
+        le=1000,
+        description="a change between forward and backwards counts as that much [m]",
+    )
+    steering_penalty: float = Field(
+        0.1,
+        ge=0,
+        le=1000,
+        description="turning the steering from stop to stop counts as that much [m]",
+    )
+    heading_bins: int = Field(72, ge=8, le=720, description="headings told apart [bins per turn]")
+    step_length: float | None = Field(
+        None,
+        gt=0,
+        le=100,
+        description="length of a motion [m]; none, and the least: the diagonal of a cell",
+    )
+    analytic_ratio: float = Field(
+        3.5, gt=0, le=1000, description="the higher, the more often the curve to the goal is tried"
+    )
+    weight: float = Field(
+        1.5,
+        ge=1,
+        le=10,
+        description="how much more than itself the estimate of what is left counts",
+    )
+
+
+class HybridAStar:
+    """Hybrid A* over motions of constant curvature (Dolgov, Thrun, Montemerlo, Diebel 2010).
+
+    Waypoints are poses, at most half a cell apart; the first and the last are start and goal
+    exactly. The robot drives along its heading, forward or backwards, and turns no tighter than
+    told. No route is the best one for sure: one pose stands for all in its cell and bin.
+
+    Between two poses the footprint is taken to sweep the convex hull of its places in both (of a
+    concave one: of each triangle of its constrained Delaunay triangulation), and where it turns,
+    about a millimetre around that (on cells of more than a metre, a thousandth of a cell: `BULGE`
+    in `planners.costmap.swept_footprint`), which no point of it ever leaves. A disc is checked by
+    the distance of the line. Where nothing turns, both are exact.
+
+    Examples
+    --------
+    >>> from groundmap import ConfidenceGrid
+    >>> from planners.problem.problem import PlanningProblem
+    >>> grid = ConfidenceGrid(resolution=0.5)
+    >>> grid.fuse(np.array([0, 0]), np.full((64, 64), -1.0, dtype=np.float32))
+    >>> car = [(-0.5, -0.4), (1.5, -0.4), (1.5, 0.4), (-0.5, 0.4)]
+    >>> problem = PlanningProblem(grid, start=(5, 5, 0), goal=(9, 9, np.pi / 2), footprint=car)
+    >>> engine = HybridAStar(Costmap.of(problem))
+    >>> found = engine.search(problem.start, problem.goal, HybridAStarSettings(turning_radius=4))
+    >>> found.waypoints[[0, -1]].tolist(), found.headings[[0, -1]].tolist(), found.expanded
+    ([[5.0, 5.0], [9.0, 9.0]], [0.0, 1.5707963267948966], 1)
+    """
+
+    name: ClassVar[str] = "hybrid_astar"
+
+    def __init__(self, costmap: Costmap) -> None:
+        self.costmap = costmap
+        size = costmap.window.resolution
+        footprint = costmap.problem.shape
+        self.ground = ground_of(costmap)
+        self.shape = shape_of(footprint, size, slack=costmap.slack)
+        self.field = field_of(costmap, footprint)
+        self.prices = Prices(costmap.costs, factors_of(costmap))
+        self.nodes = empty_nodes(FIRST_ROOM)
+        self.heap = np.empty((2 * FIRST_ROOM, 2), dtype=np.int64)
+        # Nothing waits: this only compiles, which may take long, where no clock is running yet.
+        drive, shot = _drive(HybridAStarSettings(), size), no_shot()
+        self._advance(drive, np.zeros(3), np.zeros(STATE_SIZE, dtype=np.int64), shot)
+
+    def search(self, start: Pose, goal: Pose, settings: HybridAStarSettings) -> SearchResult | None:
+        """Return a route from start to goal, or None if there is none.
+
+        None is also what a start or a goal gets where the footprint overlaps blocked cells.
+
+        Raises
+        ------
+        ProblemError
+            A start or a goal without a yaw.
+        TimeLimitError
+            Time ran out; with a limit of 0, always.
+        """
+        clock = Clock(self.name, settings.time_limit)
+        clock.check(0)
+        a, b = self._in_cells("start", start), self._in_cells("goal", goal)
+        if not (self._is_clear(a) and self._is_clear(b)):
+            return None
+        drive = _drive(settings, self.costmap.window.resolution)
+        seed_field(self.field, int(b[1]) * self.costmap.width + int(b[0]))
+        state = begin(self.ground, self.field, drive, a, b, self.nodes, self.heap)
+        shot = no_shot()
+        status, budget = -1, 1
+        while status not in (FOUND, EXHAUSTED):
+            clock.check(int(state[EXPANDED]))
+            before = clock.seconds
+            status = self._advance(drive, b, state, shot, budget)
+            hurried = clock.seconds - before > SOON
+            budget = max(budget // 4, 1) if hurried else min(2 * budget, SLICE)
+        if status == EXHAUSTED:
+            return None
+        curvatures, lengths = self._motions(drive, int(state[LAST]), shot)
+        poses = drive_along(self.shape, a, curvatures, lengths)
+        return self._to_result(poses, start, goal, int(state[EXPANDED]))
+
+    def _in_cells(self, place: Place, pose: Pose) -> Floats:
+        """Return a pose in cells, with its yaw."""
+        if len(pose) != 3:
+            raise ProblemError(place, f"x, y [m] and yaw [rad] for {self.name}", str(pose))
+        x, y = self.costmap.to_cells(pose[:2])[0]
+        return np.array([x, y, wrap(pose[2])])
+
+    def _is_clear(self, pose: Floats) -> bool:
+        rows, cols = self.ground.blocked.shape
+        within = 0 <= pose[0] < cols and 0 <= pose[1] < rows
+        x, y, yaw = pose.tolist()
+        return within and bool(step_clear(self.ground, self.shape, x, y, yaw, x, y, yaw, 0.0))
+
+    def _advance(
+        self, drive: Drive, goal: Floats, state: Ints, shot: Shot, budget: int = SLICE
+    ) -> int:
+        status: int = advance(
+            self.ground,
+            self.shape,
+            self.field,
+            self.prices,
+            drive,
+            goal,
+            self.nodes,
+            self.heap,
+            state,
+            shot,
+            budget,
+        )
+        if status == FULL:
+            self.heap = np.concatenate([self.heap, np.empty_like(self.heap)])
+            smaller, count = self.nodes, int(state[COUNT])
+            self.nodes = empty_nodes(2 * len(smaller.costs))
+            for name in Nodes._fields[:-1]:
+                getattr(self.nodes, name)[:count] = getattr(smaller, name)[:count]
+            refile(self.nodes, count)
+        return status
+
+    def _motions(self, drive: Drive, node: int, shot: Shot) -> tuple[Floats, Floats]:
+        """Return curvatures and lengths from the start through a node and along the last curve."""
+        motions = []
+        while self.nodes.motions[node] != ROOT:
+            gear, turn = steering(self.nodes.motions[node])
+            motions.append((turn * drive.curvature, gear * reach(drive, turn)))
+            node = self.nodes.parents[node]
+        motions.reverse()
+        for turn, arc in zip(shot.turns.tolist(), shot.lengths.tolist(), strict=True):
+            length = arc / drive.curvature
+            if arc != 0.0:
+                count = pieces(drive, length)
+                motions += [(turn * drive.curvature, length / count)] * count
+        curvatures, lengths = np.array(motions, dtype=np.float64).reshape(-1, 2).T
+        return curvatures.copy(), lengths.copy()
+
+    def _to_result(self, poses: Floats, start: Pose, goal: Pose, expanded: int) -> SearchResult:
+        """Return poses [cells] as a route on the map, with start and goal as they were given."""
+        if len(poses) == 1:
+            poses = np.concatenate([poses, poses])
+        window = self.costmap.window
+        waypoints = window.origin + poses[:, :2] * window.resolution
+        headings = np.remainder(poses[:, 2] + math.pi, 2.0 * math.pi) - math.pi
+        for i, (x, y, yaw) in ((0, start), (-1, goal)):
+            waypoints[i], headings[i] = (x, y), yaw
+        cost = None if self.costmap.uniform else self._cost(poses)
+        return SearchResult(waypoints, expanded, headings, bound=None, cost=cost)
+
+    def _cost(self, poses: Floats) -> float:
+        """Return the length of a line [m], with what its cells add to it; no penalties."""
+        steps = np.diff(poses[:, :2], axis=0)
+        middle = poses[:-1, :2] + 0.5 * steps
+        costs = self.costmap.costs[tuple(np.floor(middle[:, ::-1]).astype(np.int64).T)]
+        lengths = np.hypot(*steps.T) * self.costmap.window.resolution
+        return float(lengths @ self.prices.factors[costs])
+
+
+def _drive(settings: HybridAStarSettings, size: float) -> Drive:
+    """Return the settings in cells of a side of `size` [m]."""
+    step = math.sqrt(2.0)
+    if settings.step_length is not None:
+        step = max(settings.step_length / size, step)
+    return Drive(
+        step=step,
+        arc=min(step, math.pi * settings.turning_radius / size),
+        curvature=size / settings.turning_radius,
+        gears=1 if settings.motion == "dubins" else 2,
+        reverse=settings.reverse_penalty,
+        cusp=settings.gear_change_penalty / size,
+        steer=settings.steering_penalty / size,
+        bins=settings.heading_bins,
+        ratio=settings.analytic_ratio,
+        weight=settings.weight,
+    )

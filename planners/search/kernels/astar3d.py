@@ -1,0 +1,209 @@
+"""A* over voxels, in slices, so that Python can watch the clock in between.
+
+Costs are the integers of `planners.search.kernels.astar`; a move through a voxel's corner costs
+`SPACE`. Moves are found as the search goes: a bit per voxel of the 3 x 3 x 3 around a node says
+where the robot may stand. Bits are numbered x first, then y, then z; bit 13 is the node itself, bit
+k the voxel that move k leads to. A move needs every voxel of the box that it spans.
+
+Half of all moves need no look: arrived at n from p by move d, move e to m is left out if the voxels
+around n offer a way from p to m that is shorter, or as long with a shorter last move (p to m at
+once, or the two moves of the shortest way, the longer one first). No optimum is lost by that. Let
+all nodes nearer than m be reached at their best, and take of the last moves of all shortest ways to
+m one of the shortest: into m from n. Were it left out, the other way would be as short, and reach
+m by a still shorter last move, from a node nearer than m. The costs of ties are integers, so that
+"as long" means what it says.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from numba import njit
+
+from groundmap.arrays import Bools, Ints, Ints32
+from planners.costmap.kernels.moves import DIAGONAL, ONE
+from planners.search.kernels.astar import EXHAUSTED, FAR, FOUND, HEAP_FULL, SLICE_DONE
+from planners.search.kernels.heap import drop_top, push, replace_top, top_node
+
+SPACE = 7439101574  # round(sqrt(3) * ONE)
+MARK, CLOSED, CAME, ROOT = 64, 32, 31, 13  # parts of a mark; ROOT: no move led here
+EVERYWHERE, NEVER = 2**27 - 1, 2**27  # masks: the robot may stand all around; not a voxel
+SIZE, BEST, TARGET, EXPANDED = range(4)  # entries of `state`
+
+#: Layer, row and column that each move adds; shape (27, 3).
+STEPS = np.array(list(itertools.product((-1, 0, 1), repeat=3)), dtype=np.int64)
+#: Cost of each move; shape (27,).
+COSTS = np.array([0, ONE, DIAGONAL, SPACE], dtype=np.int64)[np.abs(STEPS).sum(axis=1)]
+
+
+def _box(first: Ints, last: Ints) -> int:
+    """Return the mask of the box between two voxels, each in [-1, 1]³."""
+    low, high = np.minimum(first, last), np.maximum(first, last)
+    inside = (np.clip(STEPS, low, high) == STEPS).all(axis=1)
+    return int(sum(1 << int(k) for k in np.flatnonzero(inside)))
+
+
+def _detour(arrival: int, move: int) -> int:
+    """Return what must be free for the other way, that makes `move` after `arrival` needless."""
+    before, after = -STEPS[arrival], STEPS[move]
+    whole = after - before
+    if ROOT in (arrival, move):
+        return NEVER
+    if np.abs(whole).max() < 2:
+        return _box(before, after)
+    # Along an axis of 2 both moves go; one of 1 is gone along at once.
+    between = before + np.sign(whole)
+    if (between == 0).all():
+        return NEVER  # `move` itself is the shortest way on
+    return _box(before, between) | _box(between, after)
+
+
+NEEDS = np.array([_box(np.zeros(3, dtype=np.int64), step) for step in STEPS], dtype=np.int64)
+DETOURS = np.array([[_detour(d, e) for e in range(27)] for d in range(27)], dtype=np.int64)
+
+
+@njit(cache=True, nogil=True)
+def estimate(layer: int, row: int, col: int, targets: Ints) -> int:
+    """Return the smallest (26-connected distance to a target + its final cost): consistent."""
+    least = FAR
+    for k in range(len(targets)):
+        x, y, z = abs(col - targets[k, 2]), abs(row - targets[k, 1]), abs(layer - targets[k, 0])
+        low, high = min(x, y, z), max(x, y, z)
+        middle = x + y + z - low - high
+        way = (high - middle) * ONE + (middle - low) * DIAGONAL + low * SPACE
+        least = min(least, way + targets[k, 3])
+    return least
+
+
+@njit(cache=True, nogil=True)
+def plates_of(traversable: Bools) -> Ints32:
+    """Return where the robot may stand among the 3 x 3 voxels around each one, in its own layer.
+
+    Parameters
+    ----------
+    traversable : ndarray of bool, shape (layers, rows, cols)
+        Its borders must be false.
+
+    Returns
+    -------
+    ndarray of int32, shape (layers * rows * cols,)
+        Masks of 9 bits, x first, then y.
+    """
+    layers, rows, cols = traversable.shape
+    plates = np.zeros((layers, rows, cols), dtype=np.int32)
+    for layer in range(layers):
+        for row in range(1, rows - 1):
+            for col in range(1, cols - 1):
+                if traversable[layer, row, col]:
+                    for k in range(9):
+                        # Seen from its neighbour, the voxel is on the opposite side.
+                        i, j = k // 3 - 1, k % 3 - 1
+                        plates[layer, row - i, col - j] |= 1 << k
+    return plates.ravel()
+
+
+@njit(cache=True, nogil=True)
+def advance(
+    plates: Ints32,
+    width: int,
+    slab: int,
+    targets: Ints,
+    labels: Ints,
+    query: int,
+    heap: Ints,
+    state: Ints,
+    budget: int,
+) -> int:
+    """Expand up to `budget` nodes.
+
+    Parameters
+    ----------
+    plates : ndarray of int32, shape (voxels,)
+        From `plates_of`.
+    width, slab : int
+        Voxels in a row, and in a layer.
+    targets : ndarray of int64, shape (n, 4)
+        Layer, row, column and final cost of the voxels that are joined to the goal.
+    labels : ndarray of int64, shape (voxels, 2)
+        Per voxel the cost so far and a mark: 64 * query + 32 if closed + the move that led here
+        (or `ROOT`). Marks below 64 * query are of earlier queries.
+    query : int
+        Number of this query, from 1.
+    heap : ndarray of int64, shape (room, 2)
+        Keyed by f = g + h; ties go to the smaller h.
+    state : ndarray of int64, shape (4,)
+        Heap size, best total cost, its target, number of expanded nodes.
+
+    Returns
+    -------
+    int
+        `FOUND`, `EXHAUSTED`, `SLICE_DONE`, or `HEAP_FULL` (call again with more room).
+    """
+    fresh, end = MARK * query, state[EXPANDED] + budget
+    size, expanded, best = state[SIZE], state[EXPANDED], state[BEST]
+    status = EXHAUSTED
+    while size > 0 and heap[0, 0] < best:  # nothing else that waits can better `best`
+        if expanded >= end or size + 26 > len(heap):
+            status = SLICE_DONE if expanded >= end else HEAP_FULL
+            break
+        node = top_node(heap)
+        if labels[node, 1] & CLOSED:  # it came out before, at a lower cost
+            size = drop_top(heap, size)
+            continue
+        arrival = labels[node, 1] & CAME
+        labels[node, 1] |= CLOSED
+        expanded += 1
+        cost = labels[node, 0]
+        layer = node // slab
+        row = (node - layer * slab) // width
+        col = node - layer * slab - row * width
+        for k in range(len(targets)):
+            here = layer == targets[k, 0] and row == targets[k, 1] and col == targets[k, 2]
+            if here and cost + targets[k, 3] < best:
+                best = cost + targets[k, 3]
+                state[TARGET] = node
+        around = plates[node - slab] | (plates[node] << 9) | (plates[node + slab] << 18)
+        on_top = True
+        for k in range(27):
+            if k == ROOT or not _is_of_use(arrival, k, around):
+                continue
+            to = node + STEPS[k, 0] * slab + STEPS[k, 1] * width + STEPS[k, 2]
+            reached = cost + COSTS[k]
+            if labels[to, 1] < fresh or reached < labels[to, 0]:
+                labels[to, 0], labels[to, 1] = reached, fresh + k
+                h = estimate(layer + STEPS[k, 0], row + STEPS[k, 1], col + STEPS[k, 2], targets)
+                if on_top:
+                    replace_top(heap, size, reached + h, h, to)
+                    on_top = False
+                else:
+                    size = push(heap, size, reached + h, h, to)
+        if on_top:
+            size = drop_top(heap, size)
+    if status == EXHAUSTED and best < FAR:
+        status = FOUND
+    state[SIZE], state[EXPANDED], state[BEST] = size, expanded, best
+    return status
+
+
+@njit(cache=True, nogil=True)
+def _is_of_use(arrival: int, move: int, around: int) -> bool:
+    """Whether a move is allowed, and no way around its node makes it needless."""
+    if (around & NEEDS[move]) != NEEDS[move]:
+        return False
+    detour = DETOURS[arrival, move]
+    return bool((around & detour) != detour)
+
+
+@njit(cache=True, nogil=True)
+def trace(labels: Ints, width: int, slab: int, node: int) -> Ints:
+    """Return the voxels where the path to `node` begins, turns and ends, last first."""
+    turns = [node]
+    heading = labels[node, 1] & CAME
+    while heading != ROOT:
+        node -= STEPS[heading, 0] * slab + STEPS[heading, 1] * width + STEPS[heading, 2]
+        before = labels[node, 1] & CAME
+        if before != heading:
+            turns.append(node)
+        heading = before
+    return np.array(turns, dtype=np.int64)

@@ -1,0 +1,142 @@
+"""Maps for other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import numpy.testing as npt
+import pytest
+
+from groundmap.errors import InputError
+from groundmap.grid.grid import ConfidenceGrid
+from groundmap.grid.window import CellState
+from groundmap.io import EXPORTERS, export
+from groundmap.io.ros_map import FREE_THRESH, OCCUPIED_THRESH
+
+CELLS = {"free": (0, 0), "nonfree": (0, 1), "contested": (2, 0), "drop_off": (2, 2)}
+
+
+@pytest.fixture
+def grid() -> ConfidenceGrid:
+    """One tile with a cell of every state, whose corner lies at (-6.1, 2.3)."""
+    made = ConfidenceGrid(resolution=0.1524, origin=(-6.1, 2.3))
+    tile = made.tile((0, 0))
+    for cell, confidence in (("free", -0.5), ("nonfree", 0.5), ("contested", 0.001)):
+        tile.confidence[CELLS[cell]] = confidence
+        tile.count[CELLS[cell]] = 2
+    tile.drop_offs[CELLS["drop_off"]] = 3
+    return made
+
+
+def read_pgm(path: Path) -> np.ndarray[tuple[int, int], np.dtype[np.uint8]]:
+    magic, size, depth, pixels = path.read_bytes().split(b"\n", 3)
+    assert (magic, depth) == (b"P5", b"255")
+    cols, rows = map(int, size.split())
+    return np.frombuffer(pixels, dtype=np.uint8).reshape(rows, cols)
+
+
+def test_a_ros_map_shows_each_state_with_the_largest_y_on_top(
+    grid: ConfidenceGrid, tmp_path: Path
+) -> None:
+    export(grid, tmp_path / "map.yaml")
+    image = read_pgm(tmp_path / "map.pgm")[::-1]
+    assert image.shape == (64, 64)
+    assert {name: int(image[cell]) for name, cell in CELLS.items()} == {
+        "free": 254,
+        "nonfree": 0,
+        "contested": 205,
+        "drop_off": 0,
+    }
+    assert int((image == 205).sum()) == 64 * 64 - 3
+
+
+def test_a_ros_map_says_where_it_lies_with_every_digit(
+    grid: ConfidenceGrid, tmp_path: Path
+) -> None:
+    grid.tile((-1, -2))
+    export(grid, tmp_path / "map.yaml")
+    x, y = -6.1 - 128 * 0.1524, 2.3 - 64 * 0.1524
+    assert (tmp_path / "map.yaml").read_text().splitlines() == [
+        "image: map.pgm",
+        "mode: trinary",
+        "resolution: 0.1524",
+        f"origin: [{x!r}, {y!r}, 0]",
+        "negate: 0",
+        "occupied_thresh: 0.65",
+        "free_thresh: 0.196",
+    ]
+    assert read_pgm(tmp_path / "map.pgm").shape == (128, 192)
+
+
+def test_map_server_reads_each_grey_as_the_state_it_was(
+    grid: ConfidenceGrid, tmp_path: Path
+) -> None:
+    export(grid, tmp_path / "map.yaml")
+    # map_server's trinary mode, with negate 0.
+    occupancy = (255 - read_pgm(tmp_path / "map.pgm")[::-1].astype(float)) / 255
+    read = np.full(occupancy.shape, CellState.UNKNOWN)
+    read[occupancy < FREE_THRESH] = CellState.FREE
+    read[occupancy > OCCUPIED_THRESH] = CellState.NONFREE
+    states = grid.window().states()
+    states[states == CellState.CONTESTED] = CellState.UNKNOWN
+    npt.assert_array_equal(read, states)
+
+
+def test_numbers_and_names_are_yaml_whatever_they_are(tmp_path: Path) -> None:
+    grid = ConfidenceGrid(resolution=1e-05, origin=(1e22, 0.0))
+    grid.tile((0, 0))
+    export(grid, tmp_path / "a: b.yaml")
+    text = (tmp_path / "a: b.yaml").read_text()
+    assert 'image: "a: b.pgm"\n' in text
+    assert "resolution: 1.0e-05\n" in text
+    assert "origin: [1.0e+22, 0.0, 0]\n" in text
+
+
+@pytest.mark.parametrize("origin", [(-6.1, 2.3), (-6.1, 2.3, 0.5)])
+def test_dense_arrays_are_the_window(tmp_path: Path, origin: tuple[float, ...]) -> None:
+    grid = ConfidenceGrid(resolution=0.1524, origin=origin)
+    rng = np.random.default_rng(0)
+    tile = grid.tile((0,) * len(origin))
+    tile.confidence[...] = rng.uniform(-1, 1, tile.confidence.shape)
+    tile.count[...] = rng.integers(0, 9, tile.count.shape)
+    tile.drop_offs[...] = rng.integers(0, 9, tile.count.shape)
+    export(grid, tmp_path / "map.npz")
+    with np.load(tmp_path / "map.npz", allow_pickle=False) as arrays:
+        assert set(arrays) == {"confidence", "count", "drop_offs", "resolution", "origin"}
+        npt.assert_array_equal(arrays["confidence"], tile.confidence)
+        npt.assert_array_equal(arrays["count"], tile.count)
+        npt.assert_array_equal(arrays["drop_offs"], tile.drop_offs)
+        assert arrays["resolution"] == 0.1524
+        npt.assert_array_equal(arrays["origin"], origin)
+
+
+@pytest.mark.parametrize("suffix", sorted(EXPORTERS))
+def test_an_empty_map_is_refused_and_nothing_written(tmp_path: Path, suffix: str) -> None:
+    with pytest.raises(InputError, match="grid: expected a map of something, got an empty one"):
+        export(ConfidenceGrid(), tmp_path / f"map{suffix}")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_3d_map_is_no_image(tmp_path: Path) -> None:
+    grid = ConfidenceGrid(origin=(0.0, 0.0, 0.0))
+    with pytest.raises(InputError, match=r"a 2-D map, got a 3-D one. Export it as .npz"):
+        export(grid, tmp_path / "map.yaml")
+
+
+@pytest.mark.parametrize("name", ["map.png", "map", "map.npz.bak"])
+def test_another_suffix_lists_the_known_ones(
+    grid: ConfidenceGrid, tmp_path: Path, name: str
+) -> None:
+    with pytest.raises(InputError, match=f"ends in .npz or .yaml, got '{name}'"):
+        export(grid, tmp_path / name)
+
+
+def test_a_suffix_in_capitals_is_the_same(grid: ConfidenceGrid, tmp_path: Path) -> None:
+    export(grid, tmp_path / "MAP.NPZ")
+    assert (tmp_path / "MAP.NPZ").is_file()
+
+
+def test_a_folder_that_does_not_exist_is_an_os_error(grid: ConfidenceGrid, tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="No such file or directory"):
+        export(grid, tmp_path / "gone" / "map.npz")

@@ -1,0 +1,229 @@
+"""Edges between sampled states: what is called clear is clear all along, and what isn't, isn't."""
+
+from __future__ import annotations
+
+import gc
+import math
+from collections.abc import Callable
+from functools import partial
+from itertools import pairwise
+from typing import Any, get_args
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from groundmap.arrays import Bools, Floats
+from oracles_curves import placed_at
+from oracles_planning import BLOCKED, FREE, grid_of, union_of_squares
+from planners.costmap.costmap import Costmap
+from planners.problem.problem import PlanningProblem
+from planners.sampling.kernels.edges import curve_clear, slide_clear
+from planners.sampling.kernels.lines import line_clear
+from planners.sampling.motion_validator import MotionValidator
+from planners.sampling.settings import StateSpace
+from strategies import rngs
+
+CAR = [(-0.5, -0.45), (1.5, -0.45), (1.5, 0.45), (-0.5, 0.45)]
+ELL = [(-0.6, -0.6), (0.9, -0.6), (0.9, 0.0), (0.0, 0.0), (0.0, 0.9), (-0.6, 0.9)]
+SIZE, SIDE = 0.5, 24  # [m] of a cell, [cells] of a map
+FINE = 200  # poses that a slow twin looks at along an edge
+
+
+def speckled(rng: np.random.Generator) -> Bools:
+    blocked: Bools = rng.random((SIDE, SIDE)) < rng.choice([0.01, 0.03, 0.1])
+    return blocked
+
+
+def ways_over(
+    blocked: Bools, footprint: Any, space: StateSpace, *, radius: float = 1.0
+) -> MotionValidator:
+    grid = grid_of(np.where(blocked, BLOCKED, FREE), resolution=SIZE)
+    ends: dict[str, Any] = {"start": (1, 1, 0), "goal": (1, 1, 0)}
+    problem = PlanningProblem(grid, **ends, footprint=footprint, clear_start=False)
+    return MotionValidator(Costmap.of(problem), space, radius)
+
+
+def forbidden(validator: MotionValidator) -> shapely.Geometry:
+    """Return the blocked squares [m, map]."""
+    window = validator.costmap.window
+    squares = union_of_squares(validator.costmap.blocked)
+    return shapely.transform(squares, lambda xy: xy * window.resolution + window.origin)
+
+
+def pose_of(rng: np.random.Generator) -> tuple[float, float, float]:
+    x, y = rng.uniform(1.0, SIZE * SIDE - 1.0, 2).tolist()
+    return x, y, float(rng.uniform(-math.pi, math.pi))
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.3, 1.1])
+@given(rng=rngs())
+@settings(max_examples=40)
+def test_a_line_is_clear_if_and_only_if_the_disc_keeps_its_distance(
+    radius: float, rng: np.random.Generator
+) -> None:
+    validator = ways_over(speckled(rng), radius, "r2")
+    walls = forbidden(validator)
+    for _ in range(20):
+        a, b = pose_of(rng)[:2], pose_of(rng)[:2]
+        away = float(shapely.distance(shapely.LineString([a, b]), walls))
+        assume(abs(away - radius) > 1e-9 or away == 0.0)
+        expected = away >= max(radius, 1e-9)
+        assert validator.is_clear(*validator.state_of(a), *validator.state_of(b)) == expected
+
+
+@pytest.mark.parametrize("footprint", [0.5, CAR, ELL])
+@pytest.mark.parametrize("space", ["se2", "dubins", "reeds_shepp"])
+@given(rng=rngs())
+@settings(max_examples=12)
+def test_an_edge_is_clear_if_what_it_sweeps_is(
+    space: StateSpace, footprint: Any, rng: np.random.Generator
+) -> None:
+    validator = ways_over(speckled(rng), footprint, space)
+    walls = forbidden(validator)
+    shape = validator.costmap.problem.shape
+    outline = shapely.Point(0, 0).buffer(0.5) if shape.is_disc else shapely.Polygon(shape.polygon)
+    for _ in range(6):
+        a, b = (validator.state_of(pose_of(rng)) for _ in range(2))
+        poses = validator.poses([a, b])
+        swept = shapely.union_all([placed_at(outline, pose) for pose in denser(poses)])
+        inside = shapely.buffer(walls, -1e-6, join_style="mitre")
+        outside = shapely.buffer(walls, 0.02)  # a step of a curve is about 1 mm off its chord
+        if validator.is_clear(*a, *b):
+            assert not swept.intersects(inside)
+            assert within_map(validator, poses)
+        elif within_map(validator, poses):
+            assert swept.intersects(outside)
+
+
+def denser(poses: Floats) -> Floats:
+    """Return poses with those half-way between."""
+    turns = np.remainder(np.diff(poses[:, 2]) + np.pi, 2.0 * np.pi) - np.pi
+    steps = np.column_stack([np.diff(poses[:, :2], axis=0), turns])
+    return np.concatenate([poses, poses[:-1] + 0.5 * steps])
+
+
+def within_map(validator: MotionValidator, poses: Floats) -> bool:
+    cells = validator.costmap.to_cells(poses[:, :2])
+    return bool((cells >= 0).all() and (cells < validator.costmap.blocked.shape[0]).all())
+
+
+@pytest.mark.parametrize("space", ["r2", "se2", "reeds_shepp"])
+@given(rng=rngs())
+@settings(max_examples=20)
+def test_the_way_back_is_clear_where_the_way_is(
+    space: StateSpace, rng: np.random.Generator
+) -> None:
+    validator = ways_over(speckled(rng), CAR if space != "r2" else 0.5, space)
+    for _ in range(10):
+        a, b = (validator.state_of(pose_of(rng)) for _ in range(2))
+        assert validator.is_clear(*a, *b) == validator.is_clear(*b, *a)
+        there, back = validator.poses([a, b]), validator.poses([b, a])
+        np.testing.assert_allclose(back[::-1, :2], there[:, :2], atol=1e-9)
+
+
+@pytest.mark.parametrize("space", ["se2", "dubins", "reeds_shepp"])
+@given(rng=rngs())
+@settings(max_examples=20)
+def test_poses_lead_from_state_to_state_in_steps_of_half_a_cell(
+    space: StateSpace, rng: np.random.Generator
+) -> None:
+    validator = ways_over(np.zeros((SIDE, SIDE), dtype=np.bool_), CAR, space)
+    states = [validator.state_of(pose_of(rng)) for _ in range(4)]
+    poses = validator.poses(states)
+    assert np.hypot(*np.diff(poses[:, :2], axis=0).T).max() <= 0.5 * SIZE + 1e-9
+    for state in states:
+        x, y = state[:2] + validator.costmap.window.origin
+        off = np.hypot(poses[:, 0] - x, poses[:, 1] - y)
+        turn = np.remainder(poses[:, 2] - state[2] + np.pi, 2.0 * np.pi) - np.pi
+        assert (off + np.abs(turn)).min() <= 1e-9
+    assert validator.length(states) > 0.0
+
+
+@given(rng=rngs(), at=st.integers(0, 2**20))
+@settings(max_examples=30)
+def test_what_can_be_reached_lies_in_the_room(rng: np.random.Generator, at: int) -> None:
+    rng = np.random.default_rng(at)
+    validator = ways_over(rng.random((SIDE, SIDE)) < 0.35, 0.2, "r2")
+    states = [validator.state_of(pose_of(rng)[:2]) for _ in range(40)]
+    clear = [state for state in states if validator.is_clear(*state, *state)]
+    assume(len(clear) > 1)
+    for a, b in pairwise(clear):
+        room = validator.room(a, b)
+        if validator.is_clear(*a, *b):
+            assert room is not None
+        if room is not None:
+            for state in (a, b):
+                assert room[0] <= state[0] <= room[2]
+                assert room[1] <= state[1] <= room[3]
+
+
+@given(rng=rngs())
+@settings(max_examples=20)
+def test_a_check_outlives_its_ways_and_says_what_its_kernel_says(rng: np.random.Generator) -> None:
+    blocked = speckled(rng)
+    for space in get_args(StateSpace):
+        if space == "r3":
+            continue
+        footprint = 0.3 if space == "r2" else CAR
+        validator = ways_over(blocked, footprint, space)
+        told, is_clear = kernel_of(validator), validator.is_clear
+        del validator
+        gc.collect()
+        for _ in range(20):
+            ends = [pose_of(rng)[: 2 if space == "r2" else 3] for _ in range(2)]
+            assert is_clear(*ends[0], *ends[1]) is told(*ends[0], *ends[1])
+
+
+def kernel_of(validator: MotionValidator) -> Callable[..., bool]:
+    """Return the check with copies of all its arrays."""
+    body: list[Any] = [array.copy() for array in validator.body]
+    if validator.space == "r2":
+        return partial(
+            line_clear,
+            body[0],
+            body[2],
+            SIZE,
+            validator.costmap.radius / SIZE,
+            validator.shape.touch,
+        )
+    if validator.space == "se2":
+        return partial(slide_clear, *body)
+    return partial(curve_clear, validator.space == "dubins", *body)
+
+
+@pytest.mark.parametrize("footprint", [0.0, 0.3, CAR])
+@pytest.mark.parametrize("space", ["r2", "se2", "dubins"])
+def test_states_off_the_map_are_not_clear(space: StateSpace, footprint: Any) -> None:
+    validator = ways_over(np.zeros((SIDE, SIDE), dtype=np.bool_), footprint, space)
+    high = SIZE * np.array(validator.costmap.blocked.shape[::-1])
+    inside = validator.state_of((6.0, 6.0, 0.0))[:2]
+    yaw = () if space == "r2" else (0.3,)
+    assert validator.is_clear(*inside, *yaw, *inside, *yaw)
+    for x in (-0.1, np.nextafter(0.0, -1.0), high[0], math.inf, -math.inf, math.nan):
+        off = float(x), inside[1]
+        assert not validator.is_clear(*inside, *yaw, *off, *yaw)
+        assert not validator.is_clear(*off, *yaw, *inside, *yaw)
+    corner = tuple(np.nextafter(high, 0.0).tolist())
+    assert not validator.is_clear(*inside, *yaw, *corner, *yaw)  # what lies around a map is unknown
+
+
+def test_edges_are_short_where_room_is_scarce_and_never_longer_than_a_share_of_the_map() -> None:
+    hall = np.zeros((SIDE, SIDE), dtype=np.bool_)
+    ranges = []
+    for walls in (hall, speckled_evenly(3), speckled_evenly(2)):
+        validator = ways_over(walls, 0.0, "r2")
+        state = validator.state_of((SIZE / 2.0, SIZE / 2.0))
+        region, room = validator.region(state), validator.room(state, state)
+        assert room is not None
+        ranges.append(validator.reach(region, room))
+    assert ranges[0] == pytest.approx(0.2 * math.sqrt(2.0) * SIZE * SIDE)
+    assert ranges[0] > ranges[1] > ranges[2] > SIZE
+
+
+def speckled_evenly(every: int) -> Bools:
+    blocked = np.zeros((SIDE, SIDE), dtype=np.bool_)
+    blocked[every - 1 :: every, every - 1 :: every] = True
+    return blocked

@@ -1,0 +1,133 @@
+"""Trees and roadmaps as arrays: what OMPL grew, checked against its own answers."""
+
+from __future__ import annotations
+
+import gc
+from itertools import count
+from typing import Any
+
+import numpy as np
+import pytest
+
+from oracles_planning import BLOCKED, FREE, grid_of
+from planners import PlanningProblem, SamplingSettings
+from planners.costmap.costmap import Costmap
+from planners.problem.problem import Pose
+from planners.sampling.motion_validator import MotionValidator
+from planners.sampling.ompl_module import ompl, redirect_log, samplers
+from planners.sampling.ompl_states import edge_check, reader, space_of, state_of
+from planners.sampling.planner_data import graph_of
+from planners.sampling.settings import StateSpace
+from planners.search.graph import Graph
+
+CAR = [(-0.5, -0.45), (1.0, -0.45), (1.0, 0.45), (-0.5, 0.45)]
+SPACES: list[StateSpace] = ["r2", "se2", "dubins", "reeds_shepp"]
+pytestmark = pytest.mark.skipif(not samplers(), reason="ompl is not installed")
+
+
+def ways_in(space: StateSpace) -> MotionValidator:
+    field = np.full((48, 48), FREE, dtype=np.float32)
+    field[:36, 24] = BLOCKED
+    grid = grid_of(field, resolution=0.25, origin=(-3.0, 7.0))
+    ends: dict[str, Any] = {"start": (0, 9, 0), "goal": (0, 9, 0)}
+    problem = PlanningProblem(grid, **ends, footprint=CAR, clear_start=False)
+    return MotionValidator(Costmap.of(problem), space, 1.0)
+
+
+def searched(
+    name: str, validator: MotionValidator, *, looks: int = 300
+) -> tuple[Graph, list[Pose], list[tuple[int, int]]]:
+    """Return what a planner grew in so many looks, and states and edges as OMPL lists them."""
+    base, geometric, util = ompl()
+    with redirect_log():
+        util.RNG.setSeed(1)
+        begin, end = validator.state_of((0.0, 9.0, 0.0)), validator.state_of((6.0, 9.0, 1.0))
+        room = validator.room(begin, end)
+        assert room is not None
+        space = space_of(base, validator.space, room, SamplingSettings())
+        information = base.SpaceInformation(space)
+        read = reader(validator.space)
+        information.setStateValidityChecker(lambda state: validator.is_clear(*2 * read(state)))
+        check = edge_check(validator, count(1), lambda: None)
+        motions = type("Motions", (base.MotionValidator,), {"checkMotion": check})
+        information.setMotionValidator(motions(information))
+        information.setup()
+        definition = base.ProblemDefinition(information)
+        ends = (state_of(space, state, validator.space) for state in (begin, end))
+        definition.setStartAndGoalStates(*ends)
+        planner = getattr(geometric, name)(information)
+        planner.setProblemDefinition(definition)
+        planner.setup()
+        asked = count()
+        stop = base.PlannerTerminationCondition(lambda: next(asked) >= looks)
+        (planner.growRoadmapPtc if name == "PRM" else planner.solve)(stop)
+        graph = graph_of(base, planner, information, validator)
+        return graph, *_listed(base, planner, information, validator)
+
+
+def _listed(
+    base: Any, planner: Any, information: Any, validator: MotionValidator
+) -> tuple[list[Pose], list[tuple[int, int]]]:
+    data = base.PlannerData(information)
+    planner.getPlannerData(data)
+    data.decoupleFromPlanner()
+    read, indices = reader(validator.space), range(data.numVertices())
+    states = [read(data.getVertex(i).getState()) for i in indices]
+    return states, [(a, b) for a in indices for b in indices if data.edgeExists(a, b)]
+
+
+GROWN = [
+    (name, space)
+    for name in ("RRT", "RRTConnect", "RRTstar", "PRM")
+    for space in SPACES
+    if (name, space) != ("PRM", "dubins")
+]
+
+
+@pytest.mark.parametrize(("name", "space"), GROWN)
+def test_every_edge_that_ompl_has_is_there_once(name: str, space: StateSpace) -> None:
+    validator = ways_in(space)
+    graph, states, listed = searched(name, validator)
+    assert graph.vertices.shape == (len(states), 2 if space == "r2" else 3)
+    shifted = np.array(states)
+    shifted[:, :2] += validator.costmap.window.origin
+    np.testing.assert_array_equal(graph.vertices, shifted)
+    got = list(map(tuple, graph.edges.tolist()))
+    assert len(got) > 10
+    assert graph.weights.shape == (len(got),)
+    assert set(got) <= set(listed)
+    assert len({frozenset(edge) for edge in got}) == len(got)
+    assert {frozenset(edge) for edge in got} == {frozenset(edge) for edge in listed}
+    if name == "PRM":
+        assert 2 * len(got) == len(listed)
+
+
+@pytest.mark.parametrize("space", SPACES)
+def test_vertices_are_clear_places_on_the_map_and_edges_are_as_long_as_they_say(
+    space: StateSpace,
+) -> None:
+    validator = ways_in(space)
+    graph, *_ = searched("RRT", validator)
+    states = [validator.state_of(tuple(vertex)) for vertex in graph.vertices.tolist()]
+    assert all(validator.is_clear(*state, *state) for state in states)
+    for (a, b), weight in zip(graph.edges.tolist(), graph.weights.tolist(), strict=True):
+        assert validator.is_clear(*states[a], *states[b])
+        length = validator.length([states[a], states[b]])
+        assert weight == pytest.approx(length, rel=0.02)  # chords of curves are a little shorter
+        assert weight >= length - 1e-9
+
+
+def test_a_planner_that_grew_nothing_is_a_graph_without_edges() -> None:
+    for space in SPACES:
+        graph, *_ = searched("PRM", ways_in(space), looks=1)
+        assert graph.edges.shape == (0, 2)
+        assert graph.weights.shape == (0,)
+        assert graph.vertices.shape[1] == (2 if space == "r2" else 3)
+
+
+def test_a_graph_outlives_all_that_is_of_ompl() -> None:
+    graph = searched("RRTConnect", ways_in("se2"))[0]
+    gc.collect()
+    for array in (graph.vertices, graph.edges, graph.weights):
+        assert array.base is None or isinstance(array.base, np.ndarray)
+        assert np.isfinite(array.sum())
