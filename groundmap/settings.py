@@ -12,7 +12,7 @@ from groundmap.printable import format_value
 
 LARGEST_NUMBER = 1e9  # of any setting: squares and sums of such are still exact enough, and finite
 LARGEST = 1e4  # of lengths [m], ratios and angles: nothing that a rig sees needs more
-FINEST = 4_000  # cells, or samples, along max_range: a view's block then has 64 million cells
+FINEST = 20_000  # cells, or samples, along max_range: more keep one view busy for minutes
 
 
 class Settings(BaseModel):

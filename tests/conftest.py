@@ -20,6 +20,8 @@ DEFAULT_LIMIT = SearchSettings().time_limit
 TICK = 1e-4  # [s] that pass at each look at the clock of `ticking`
 PACKAGES = (groundmap, planners)
 
+collect_ignore = ["corpus"]  # damaged files, which test_fuzz.py reads; scenarios are among them
+
 # The same examples every time, and no clock: kernels compile during some first example.
 hypothesis.settings.register_profile(
     "ci",

@@ -123,9 +123,10 @@ def test_features_beyond_any_range_are_dropped_and_counted(axis: int, value: flo
     assert dict(mapped(view).stats.features_dropped) == {"out_of_range": 1}
 
 
-def test_pixels_and_noise_whose_covariance_overflows_are_dropped() -> None:
-    noisy = StereoRig(fx=700.0, fy=700.0, cx=320.0, cy=240.0, baseline=0.5, pixel_noise_px=1e300)
-    view = View.from_pixels(np.eye(4), noisy, points_px=[(355.0, 320.0, 275.0)])
+def test_pixels_whose_covariance_overflows_are_dropped() -> None:
+    rig = StereoRig(fx=700.0, fy=700.0, cx=320.0, cy=240.0, baseline=0.5)
+    disparity = 1e-80  # the depth is a number, its variance is none
+    view = View.from_pixels(np.eye(4), rig, points_px=[(disparity, 0.0, 275.0)])
     assert dict(view.dropped) == {"not_finite": 1}
 
 

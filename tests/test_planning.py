@@ -50,7 +50,7 @@ def problem(grid: ConfidenceGrid = FIELD, **values: Any) -> PlanningProblem:
         ({"footprint": "wide"}, "footprint: expected a radius .*, got 'wide'"),
         ({"footprint": [(0, 0), (1, 1), (1, 0), (0, 1)]}, r"footprint: .* meets itself at \(0.5"),
         ({"costs": {"clearance_weight": 1}}, "costs: expected CostSettings, got {'clear"),
-        ({"clear_start_radius": -1}, "clear_start_radius: expected a radius of 0 or more"),
+        ({"clear_start_radius": -1}, "clear_start_radius: expected a radius from 0 to"),
         ({"unknown": "perhaps"}, "unknown: expected 'avoid', 'allow' or 'penalise', got 'perhaps'"),
         ({"epsilon": 0}, "epsilon: expected a number between 0 and 1, got 0"),
         (

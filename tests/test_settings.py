@@ -117,6 +117,6 @@ def test_disparities_of_false_matches_in_the_wrong_order_are_refused() -> None:
 
 
 def test_a_range_of_too_many_cells_is_refused() -> None:
-    with pytest.raises(SettingsError, match=r"^resolution: expected 0.005 or more, for max_range"):
-        build(MapperSettings, resolution=0.004)
-    assert build(MapperSettings, resolution=0.004, max_range=16.0)
+    with pytest.raises(SettingsError, match=r"^resolution: expected at least max_range / 20000"):
+        build(MapperSettings, resolution=0.0009)
+    assert build(MapperSettings, resolution=0.0009, max_range=16.0)

@@ -431,7 +431,7 @@ def test_at_an_images_border_a_ground_feature_vouches_inwards_only() -> None:
 def test_lines_to_low_obstacles_count_as_far_as_surely_before_them(
     rng: np.random.Generator, model: Literal["ellipsoid", "radius", "none"]
 ) -> None:
-    options = MapperSettings(uncertainty=model, support_width=1e-9)
+    options = MapperSettings(uncertainty=model, support_angle=1e-9)
     points = rng.uniform((0.4, -4.0), (9.0, 4.0), size=(12, 2))
     sigma = rng.uniform(0.0, 0.5, size=12)
     ground_view = flat_view(

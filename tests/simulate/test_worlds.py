@@ -336,7 +336,7 @@ def test_a_crop_beside_the_map_says_where_the_map_lies(tmp_path: Path) -> None:
 
 def test_a_map_that_is_missing_is_reported_when_the_world_is_made(tmp_path: Path) -> None:
     made = MapImage(path=tmp_path / "gone.yaml")
-    with pytest.raises(FileFormatError, match=r"gone.yaml: expected a readable file, got no such"):
+    with pytest.raises(FileFormatError, match=r"gone.yaml: expected a YAML file, got no file of"):
         made.make(seeded())
 
 
