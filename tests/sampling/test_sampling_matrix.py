@@ -6,6 +6,7 @@ that process.
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -165,6 +166,7 @@ def test_whatever_is_asked_ends_in_a_route_or_an_error_of_ours(name: str) -> Non
             text=True,
             timeout=PATIENCE,
             check=False,
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},  # oracles, strategies
         )
     except subprocess.TimeoutExpired as error:
         pytest.fail(f"{name} hangs: {bytes(error.stdout or b'').decode()[-200:]}")
