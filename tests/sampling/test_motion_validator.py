@@ -95,14 +95,16 @@ def test_an_edge_is_clear_if_what_it_sweeps_is(
             assert not swept.intersects(inside)
             assert within_map(validator, poses)
         elif within_map(validator, poses):
-            assert swept.intersects(outside)
+            dense = denser(denser(denser(poses)))  # a corner may touch between two poses
+            assert any(placed_at(outline, pose).intersects(outside) for pose in dense)
 
 
 def denser(poses: Floats) -> Floats:
-    """Return poses with those half-way between."""
+    """Return poses with those half-way between, in order."""
     turns = np.remainder(np.diff(poses[:, 2]) + np.pi, 2.0 * np.pi) - np.pi
     steps = np.column_stack([np.diff(poses[:, :2], axis=0), turns])
-    return np.concatenate([poses, poses[:-1] + 0.5 * steps])
+    pairs = np.stack([poses[:-1], poses[:-1] + 0.5 * steps], axis=1)
+    return np.concatenate([pairs.reshape(-1, 3), poses[-1:]])
 
 
 def within_map(validator: MotionValidator, poses: Floats) -> bool:
