@@ -70,6 +70,27 @@ def as_positions(name: str, values: npt.ArrayLike, length: int) -> Floats:
     return positions
 
 
+def as_cell(name: str, values: npt.ArrayLike, ndim: int) -> Ints:
+    """Return one cell as int64 of shape (ndim,).
+
+    Parameters
+    ----------
+    name : str
+    values : array_like of int, shape (ndim,)
+    ndim : int
+
+    Raises
+    ------
+    InputError
+        Not one cell of whole numbers, or one farther than `FARTHEST_CELL` from cell 0.
+    """
+    cells = as_cells(name, values, ndim)
+    if len(cells) != 1:
+        raise InputError(name, f"{ndim} whole numbers", f"{len(cells)} cells")
+    cell: Ints = cells[0]
+    return cell
+
+
 def as_cells(name: str, values: npt.ArrayLike, ndim: int) -> Ints:
     """Return one cell or several as int64 of shape (n, ndim).
 

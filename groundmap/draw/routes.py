@@ -104,6 +104,8 @@ def _footprints(
         expected = "a radius of 0 or more [m], or corners x, y [m, base_link]"
         given = footprint.item() if isinstance(footprint, np.ndarray) else footprint
         radius, line = as_number("footprint", given, expected, least=0.0), _line(points)
+        if radius > LARGEST_BOX:
+            raise InputError("footprint", f"a radius up to {LARGEST_BOX:g} m", f"{radius:g}")
         if radius == 0:
             return []
         along = np.linspace(0.0, line.length, _stamps(line.length))

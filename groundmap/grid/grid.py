@@ -14,6 +14,7 @@ from groundmap.arrays import (
     Floats,
     Floats32,
     Ints,
+    as_cell,
     as_cells,
     as_floats,
     check_finite,
@@ -108,7 +109,7 @@ class ConfidenceGrid:
         """Return the tile of that index, allocated on first touch."""
         if np.ndim(index) != 1:
             raise InputError("index", f"{self.ndim} whole numbers", repr(index)[:60])
-        return self._tiles.touch(tuple(as_cells("index", index, self.ndim)[0].tolist()))
+        return self._tiles.touch(tuple(as_cell("index", index, self.ndim).tolist()))
 
     def tiles(self) -> Iterator[tuple[Index, Tile]]:
         """Iterate over (index, tile) in the order of the indices."""
@@ -212,7 +213,7 @@ class ConfidenceGrid:
         InputError
             Evidence that is NaN or beyond [-1, 1], or a cell too far off to count.
         """
-        lower = as_cells("lower", lower, self.ndim)[0]
+        lower = as_cell("lower", lower, self.ndim)
         z = np.asarray(z)
         if z.ndim != self.ndim or z.dtype.kind not in "biuf":
             got = f"{z.dtype} of shape {z.shape}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from pathlib import Path
 from typing import NamedTuple
@@ -13,6 +14,8 @@ from PIL import Image, TiffImagePlugin
 from groundmap.errors import FileFormatError
 from groundmap.files.opening import open_file
 
+TILE = 64  # [pixels] side of a map's tile
+MOST_CELLS = 2**26  # 8,192 x 8,192: their map takes 0.8 GiB
 FORMATS = ("BMP", "GIF", "JPEG", "PNG", "PPM", "TIFF", "WEBP")
 SIXTEEN_BITS = ("I;16", "I;16L", "I;16B", "I;16N")
 BITS, PHOTOMETRIC, SAMPLE_FORMAT = 258, 262, 339  # tags of a TIFF
@@ -50,6 +53,7 @@ def read_greys(path: Path, expected: str) -> Greys:
         warnings.simplefilter("ignore")
         try:
             with Image.open(stream, formats=FORMATS) as image:
+                _check_size(path, image)
                 return _greys(path, image)
         except FileFormatError:
             raise
@@ -73,6 +77,19 @@ def _greys(path: Path, image: Image.Image) -> Greys:
         return Greys(np.asarray(image.convert("L")).astype(np.uint16), 255)
     pixels = np.asarray(image.convert("RGBA" if image.has_transparency_data else "RGB"))
     return Greys(pixels.sum(axis=-1, dtype=np.uint16), 255 * pixels.shape[-1])
+
+
+def _check_size(path: Path, image: Image.Image) -> None:
+    """Refuse an image whose map needs gigabytes, before its pixels are read."""
+    width, height = image.size
+    cells = math.prod(-(-side // TILE) * TILE for side in image.size)
+    if cells > MOST_CELLS:
+        raise FileFormatError(
+            path,
+            f"an image of at most {MOST_CELLS} pixels, sides rounded up to {TILE}",
+            f"{width} x {height} pixels",
+            hint="Crop it, or scale it down and raise the resolution [m/px].",
+        )
 
 
 def _check_samples(path: Path, image: TiffImagePlugin.TiffImageFile) -> None:

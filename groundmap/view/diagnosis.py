@@ -267,7 +267,8 @@ def _judge(views: Sequence[View], shared: Iterable[_Shared], reading: Reading) -
     apart = [_apart(cameras[one.first], cameras[one.second], one.xyz) for one in shared]
     moves = np.diff([camera[:3, 3] for camera in cameras], axis=0)
     axes = np.reshape([camera[:3, 2] for camera in cameras[:-1]], (-1, 3))
-    lengths = np.linalg.norm(moves, axis=1)
+    with np.errstate(over="ignore"):  # poses of 1e200 m are longer than a float holds
+        lengths = np.linalg.norm(moves, axis=1)
     cosines = (moves * axes).sum(axis=1)[lengths > 0] / lengths[lengths > 0]
     return _Judged(
         upright,

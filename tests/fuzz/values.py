@@ -109,7 +109,8 @@ def _scaled(values: Any, draw: Draw) -> Any:
     """Return the array in other units: huge, tiny, or all the same."""
     if values.dtype.kind not in "fiu":
         return values
-    return values.astype(float) * draw.pick((0.0, -1.0, 1e-9, 1e-3, 1e3, 1e7, 1e20, 1e150))
+    with np.errstate(over="ignore"):
+        return values.astype(float) * draw.pick((0.0, -1.0, 1e-9, 1e-3, 1e3, 1e7, 1e20, 1e150))
 
 
 def _moved(values: Any, draw: Draw) -> Any:

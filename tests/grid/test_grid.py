@@ -677,3 +677,10 @@ def test_a_tile_is_there_once_it_was_touched() -> None:
     grid.fuse(np.array([-1, 70]), np.full((1, 1), -1.0, dtype=np.float32))
     assert grid.has_tile((-1, 1))
     assert not grid.has_tile((0, 1))
+
+
+@pytest.mark.parametrize("lower", [[], np.empty((0, 2), dtype=int), [[0, 0], [1, 1]]])
+def test_a_block_has_one_lower_cell(lower: Any) -> None:
+    grid = ConfidenceGrid(resolution=0.5)
+    with pytest.raises(InputError, match=r"^lower: expected 2 whole numbers, got \d cells"):
+        grid.fuse(lower, np.full((2, 2), -1.0, dtype=np.float32))

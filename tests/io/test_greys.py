@@ -120,3 +120,10 @@ def test_a_map_that_is_turned_is_refused(tmp_path: Path) -> None:
     (tmp_path / "map.yaml").write_text(YAML.format(image="map.png", mode="trinary", yaw=1e-6))
     with pytest.raises(FileFormatError, match="expected an origin of yaw 0, got 1e-06"):
         read_ros_map(tmp_path / "map.yaml")
+
+
+def test_an_image_whose_map_needs_gigabytes_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "map.png"
+    Image.new("1", (12, 2_000_000), 1).save(path)  # a few kilobytes, but 31,250 rows of tiles
+    with pytest.raises(FileFormatError, match=r"map.png: expected an image of at most \d+ pixels"):
+        read_greys(path, "an image")
