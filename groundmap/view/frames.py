@@ -11,6 +11,7 @@ from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 
 from groundmap.arrays import Floats, as_floats, check_finite
 from groundmap.errors import CameraError, InputError
@@ -22,6 +23,7 @@ T_REP103_OPTICAL: Floats = np.array(
     [[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
 )
 ORTHONORMAL_TOLERANCE = 1e-4
+LENGTH_TOLERANCE = 1e-3  # of a quaternion: programs print as few as three decimals
 
 
 def check_transform(name: str, matrix: npt.ArrayLike) -> Floats:
@@ -84,46 +86,47 @@ def map_from_world(T_world: Floats, world: WorldConvention) -> Floats:
 
 
 def from_quaternion(translation: Floats, quaternion: Floats) -> Floats:
-    """Return the transform of a translation [m] and a unit quaternion (x, y, z, w).
+    """Return the rigid transform of a translation and a quaternion.
+
+    Parameters
+    ----------
+    translation : ndarray, shape (3,) [m]
+    quaternion : ndarray, shape (4,)
+        In the order x, y, z, w.
+
+    Returns
+    -------
+    ndarray, shape (4, 4)
 
     Raises
     ------
     CameraError
-        The quaternion's length is not 1 within 1e-3.
+        The length of the quaternion differs from 1 by more than 1e-3.
+
+    Examples
+    --------
+    >>> from_quaternion(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))[:3, :3]
+    array([[1., 0., 0.],
+           [0., 1., 0.],
+           [0., 0., 1.]])
     """
     with np.errstate(over="ignore"):
         length = float(np.linalg.norm(quaternion))
-    if not abs(length - 1.0) <= 1e-3:
+    if not abs(length - 1.0) <= LENGTH_TOLERANCE:
         raise CameraError("quaternion", "length 1 (order x y z w)", f"length {length:.4g}")
-    x, y, z, w = quaternion / length
     transform = np.eye(4)
-    transform[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
+    transform[:3, :3] = Rotation.from_quat(quaternion).as_matrix()
     transform[:3, 3] = translation
     return transform
 
 
 def to_quaternion(transform: Floats) -> Floats:
-    """Return the unit quaternion (x, y, z, w), w >= 0, of a transform's rotation.
+    """Return the unit quaternion (x, y, z, w), w >= 0, of the rotation of a rigid transform.
 
     Examples
     --------
     >>> to_quaternion(np.eye(4))
     array([0., 0., 0., 1.])
     """
-    r = transform[:3, :3]
-    # The eigenvector of this symmetric matrix is stable for every rotation (Bar-Itzhack 2000).
-    k = np.array(
-        [
-            [r[0, 0] - r[1, 1] - r[2, 2], 0.0, 0.0, 0.0],
-            [r[0, 1] + r[1, 0], r[1, 1] - r[0, 0] - r[2, 2], 0.0, 0.0],
-            [r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], r[2, 2] - r[0, 0] - r[1, 1], 0.0],
-            [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], np.trace(r)],
-        ]
-    )
-    _, vectors = np.linalg.eigh(k, UPLO="L")
-    quaternion: Floats = vectors[:, -1]
-    return quaternion * (-1.0 if quaternion[3] < 0 else 1.0) + 0.0  # no negative zeros
+    quaternion: Floats = Rotation.from_matrix(transform[:3, :3]).as_quat(canonical=True)
+    return quaternion + 0.0  # no negative zeros
