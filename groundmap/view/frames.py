@@ -1,8 +1,8 @@
-"""Rigid transforms and the frames they join.
+"""Rigid transforms and coordinate frames.
 
-``T_map_camera`` takes camera coordinates to map coordinates: ``p_map = T_map_camera @ p_camera``,
-adjacent names cancel. ``map`` and ``base_link`` are x forward, y left, z up (REP-103); the camera's
-optical frame is x right, y down, z forward.
+``T_map_camera`` transforms camera coordinates to map coordinates, ``p_map = T_map_camera @
+p_camera``, so that adjacent names cancel in a product. ``map`` and ``base_link`` are x forward, y
+left, z up (REP-103); the optical frame of the camera is x right, y down, z forward.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from groundmap.errors import CameraError, InputError
 
 WorldConvention = Literal["optical", "rep103"]
 
-# Columns are the optical axes seen from a REP-103 frame: x right = -y, y down = -z, z forward = x.
+# Columns are the optical axes in a REP-103 frame: x right = -y, y down = -z, z forward = x.
 T_REP103_OPTICAL: Floats = np.array(
     [[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
 )
@@ -27,16 +27,26 @@ LENGTH_TOLERANCE = 1e-3  # of a quaternion: programs print as few as three decim
 
 
 def check_transform(name: str, matrix: npt.ArrayLike) -> Floats:
-    """Return `matrix` as a rigid 4 x 4 transform, or say what keeps it from being one.
+    """Return a read-only copy of a matrix that is a rigid transform.
+
+    Parameters
+    ----------
+    name : str
+        Name of the matrix, for error messages.
+    matrix : array_like, shape (4, 4)
+
+    Returns
+    -------
+    ndarray, shape (4, 4)
 
     Raises
     ------
     CameraError
-        The rotation part is not orthonormal, mirrors, or the last row is not 0 0 0 1.
+        The rotation part is not orthonormal or is a reflection, or the last row is not 0 0 0 1.
     InputError
-        Another shape, or NaN or infinite entries.
+        The shape is not (4, 4), or an entry is NaN or infinite.
     """
-    transform = as_floats(name, matrix, (4, 4)).copy()  # what is checked is not changed later
+    transform = as_floats(name, matrix, (4, 4)).copy()  # the caller may change `matrix` later
     check_finite(name, transform)
     rotation = transform[:3, :3]
     with np.errstate(over="ignore", invalid="ignore"):
@@ -57,7 +67,7 @@ def check_transform(name: str, matrix: npt.ArrayLike) -> Floats:
 
 
 def invert(transform: Floats) -> Floats:
-    """Return the inverse of a rigid transform, without a linear solve."""
+    """Return the inverse of a rigid transform, shape (4, 4)."""
     rotation = transform[:3, :3]
     inverse = np.eye(4)
     inverse[:3, :3] = rotation.T
@@ -66,12 +76,22 @@ def invert(transform: Floats) -> Floats:
 
 
 def map_from_world(T_world: Floats, world: WorldConvention) -> Floats:
-    """Turn a pose given in the data's world into the ``map`` frame.
+    """Return poses in the ``map`` frame from poses in the world frame of a log.
+
+    Parameters
+    ----------
+    T_world : ndarray, shape (..., 4, 4) [m, world]
+    world : {"optical", "rep103"}
+        Axes of the world frame: x right, y down, z forward; or x forward, y left, z up.
+
+    Returns
+    -------
+    ndarray, shape (..., 4, 4) [m, map]
 
     Raises
     ------
     InputError
-        Another world than "optical" or "rep103".
+        `world` is neither "optical" nor "rep103".
 
     Examples
     --------
