@@ -84,7 +84,7 @@ class GroundPlane:
         return cls(normal=rig.up, offset=offset)
 
     def height(self, points: Floats) -> Floats:
-        """Return the heights above the plane [m], shape (...), of points (..., 3) [m, base_link]."""
+        """Return the heights [m] above the plane of points, shape (..., 3) [m, base_link]."""
         x, y, z = np.moveaxis(np.asarray(points, dtype=np.float64), -1, 0)
         normal = self.normal
         heights: Floats = normal[0] * x + normal[1] * y + normal[2] * z + self.offset
