@@ -109,15 +109,15 @@ class MapperSettings(Settings):
     frame: str = Field("map", description="name of the coordinate frame of the map")
     fusion: Literal["average", "capped"] = Field(
         "average",
-        description="update rule: mean of all views, or a running average that forgets old views",
+        description="update rule: 'average' of all views, or 'capped', which forgets old views",
     )
     cap: int = Field(
         50, ge=1, le=2**32 - 1, description="update count from which 'capped' forgets old views"
     )
     uncertainty: Literal["ellipsoid", "radius", "none"] = Field(
         "ellipsoid",
-        description="spread of a surface over cells: by its covariance, equal in all directions, "
-        "or none",
+        description="spread of surfaces over cells: by their covariance ('ellipsoid'), equal in "
+        "all directions ('radius'), or 'none'",
     )
     spread_sigmas: float = Field(
         2.0, ge=0, le=LARGEST, description="extent of this spread [standard deviations]"

@@ -154,11 +154,11 @@ def judge(grid: ConfidenceGrid, held_out: HeldOut, trajectory: Floats) -> Tally:
         obstacles=len(at_obstacle),
         near_nonfree=near_nonfree(window, states, held_out.obstacles).sum(),
         in_free=(at_obstacle == CellState.FREE).sum(),
-        obstacles_unknown=_not_known(at_obstacle).sum(),
+        obstacles_unknown=_is_unknown(at_obstacle).sum(),
         grounds=len(at_ground),
         grounds_free=(at_ground == CellState.FREE).sum(),
         grounds_nonfree=(at_ground == CellState.NONFREE).sum(),
-        grounds_unknown=_not_known(at_ground).sum(),
+        grounds_unknown=_is_unknown(at_ground).sum(),
         sight_m=sight_m,
         sight_free_m=sight_free_m,
         crossings=crossings,
@@ -170,7 +170,7 @@ def judge(grid: ConfidenceGrid, held_out: HeldOut, trajectory: Floats) -> Tally:
     )
 
 
-def _not_known(states: Bytes) -> Bools:
+def _is_unknown(states: Bytes) -> Bools:
     unknown: Bools = (states == CellState.UNKNOWN) | (states == CellState.CONTESTED)
     return unknown
 
