@@ -1,4 +1,4 @@
-"""From sparse stereo features to a map one can plan on."""
+"""Confidence grids for path planning, from sparse stereo features."""
 
 from groundmap.errors import GroundmapError
 from groundmap.grid.grid import ConfidenceGrid

@@ -1,4 +1,4 @@
-"""Names for the array types, and the checks that every public function opens with."""
+"""Array types, and checks of array and number arguments."""
 
 from __future__ import annotations
 
@@ -19,17 +19,25 @@ Counts: TypeAlias = npt.NDArray[np.uint32]
 Bytes: TypeAlias = npt.NDArray[np.uint8]
 Bools: TypeAlias = npt.NDArray[np.bool_]
 
-FARTHEST_CELL = 2**60  # sums and differences of such cells stay within int64
-REAL_KINDS = "biufOSU"  # of dtypes: complex numbers, dates and records are no real numbers
+FARTHEST_CELL = 2**60  # sums and differences of such cells are within int64
+REAL_KINDS = "biufOSU"  # kinds of dtypes; not complex numbers, dates and records
 
 
 def as_floats(name: str, values: npt.ArrayLike, shape: tuple[int | None, ...]) -> Floats:
-    """Return `values` as float64 of the given shape, ``None`` being any length.
+    """Return values as a float64 array of a given shape.
+
+    Parameters
+    ----------
+    name : str
+        Name of the argument, for error messages.
+    values : array_like
+    shape : tuple of int or None
+        None for any length.
 
     Raises
     ------
     InputError
-        Not numbers, or of another shape.
+        `values` are not real numbers, or have another shape.
 
     Examples
     --------
@@ -52,12 +60,20 @@ def as_floats(name: str, values: npt.ArrayLike, shape: tuple[int | None, ...]) -
 
 
 def as_positions(name: str, values: npt.ArrayLike, length: int) -> Floats:
-    """Return one position or several as float64 of shape (n, length).
+    """Return one or more positions as a float64 array of shape (n, length).
+
+    Parameters
+    ----------
+    name : str
+        Name of the argument, for error messages.
+    values : array_like, shape (length,) or (n, length)
+    length : int
+        Number of coordinates.
 
     Raises
     ------
     InputError
-        Not numbers, of another shape, NaN or infinite.
+        `values` are not real numbers, have another shape, or are NaN or infinite.
 
     Examples
     --------
@@ -92,12 +108,20 @@ def as_cell(name: str, values: npt.ArrayLike, ndim: int) -> Ints:
 
 
 def as_cells(name: str, values: npt.ArrayLike, ndim: int) -> Ints:
-    """Return one cell or several as int64 of shape (n, ndim).
+    """Return one or more cells as an int64 array of shape (n, ndim).
+
+    Parameters
+    ----------
+    name : str
+        Name of the argument, for error messages.
+    values : array_like, shape (ndim,) or (n, ndim)
+    ndim : int
+        Number of dimensions of the grid.
 
     Raises
     ------
     InputError
-        Not whole numbers, of another shape, or farther than `FARTHEST_CELL` from cell 0.
+        `values` are not whole numbers, have another shape, or are beyond `FARTHEST_CELL`.
 
     Examples
     --------
@@ -114,7 +138,7 @@ def as_cells(name: str, values: npt.ArrayLike, ndim: int) -> Ints:
     cells = np.atleast_2d(given) if given.size else given.reshape(-1, ndim)
     if cells.ndim != 2 or cells.shape[1] != ndim:
         raise InputError(name, expected, f"shape {given.shape}")
-    # Compared as they came: uint64 beyond the range would turn negative.
+    # Before the conversion, which would make large values of uint64 negative.
     far = (cells > FARTHEST_CELL) | (cells < -FARTHEST_CELL)
     if far.any():
         row = int(np.argwhere(far)[0, 0])
@@ -128,20 +152,20 @@ def as_cells(name: str, values: npt.ArrayLike, ndim: int) -> Ints:
 
 
 def is_number(value: object) -> TypeGuard[float]:
-    """Whether a value is a finite number, and not a truth value.
+    """Return whether a value is a finite real number, and not a truth value.
 
     Examples
     --------
     >>> is_number(2), is_number(np.float32(0.5)), is_number(True), is_number("2"), is_number(np.nan)
     (True, True, False, False, False)
     """
-    if isinstance(value, (bool, np.bool_, np.timedelta64)):  # NumPy counts durations as whole
+    if isinstance(value, (bool, np.bool_, np.timedelta64)):  # to NumPy, durations are integers
         return False
     if not isinstance(value, (Real, np.floating)):
         return False
     try:
         return math.isfinite(float(value))
-    except OverflowError:  # a whole number beyond what a float holds
+    except OverflowError:  # a whole number beyond the range of floats
         return False
 
 
@@ -159,17 +183,18 @@ def as_number(
     Parameters
     ----------
     name : str
+        Name of the argument, for error messages.
     value : object
     expected : str
-        What the value should be, for the message.
-    least, above : float
-        The least number that is taken; the number that it must be above.
+        The expected value, for error messages.
+    least, above : float, default -inf
+        Inclusive and exclusive lower bounds.
     error : type of InputError, default InputError
 
     Raises
     ------
     InputError
-        Not a number (`is_number`), or out of the range.
+        `value` is not a finite number, or is out of range.
 
     Examples
     --------
@@ -186,7 +211,21 @@ def as_number(
 
 
 def check_finite(name: str, values: Floats, *, hint: str = "") -> None:
-    """Raise `InputError` at the first value that is NaN or infinite."""
+    """Check that values are finite.
+
+    Parameters
+    ----------
+    name : str
+        Name of the argument, for error messages.
+    values : ndarray
+    hint : str, optional
+        A sentence about what to do, for error messages.
+
+    Raises
+    ------
+    InputError
+        A value is NaN or infinite; the first one is named.
+    """
     wrong = ~np.isfinite(values)
     if wrong.any():
         index = tuple(int(i) for i in np.argwhere(wrong)[0])
@@ -195,12 +234,20 @@ def check_finite(name: str, values: Floats, *, hint: str = "") -> None:
 
 
 def as_numbers(name: str, values: npt.ArrayLike, expected: str) -> Floats:
-    """Return `values` as float64 of any shape; numbers beyond its range become infinite.
+    """Return values as a float64 array of any shape; numbers beyond its range become infinite.
+
+    Parameters
+    ----------
+    name : str
+        Name of the argument, for error messages.
+    values : array_like
+    expected : str
+        The expected values, for error messages.
 
     Raises
     ------
     InputError
-        Not real numbers, which are not what was `expected`.
+        `values` are not real numbers.
     """
     try:
         given = np.asarray(values)

@@ -1,17 +1,17 @@
-"""Everything that groundmap raises on purpose.
+"""The exceptions of groundmap.
 
 ::
 
     GroundmapError
-    ├── InputError (ValueError)      an array or a number is not what was asked for
-    │   ├── SettingsError            a setting is unknown or out of its range
-    │   ├── CameraError              a rig or a pose that no camera can have
-    │   └── FileFormatError          a file does not say what its format asks for
-    ├── NoGroundPlaneError           a camera with no ground plane below it
-    └── MergeError                   two maps that do not add up
+    ├── InputError (ValueError)      an argument is invalid
+    │   ├── SettingsError            a setting is unknown or out of range
+    │   ├── CameraError              a rig or a pose is not that of a camera
+    │   └── FileFormatError          a file is missing, unreadable or not in its format
+    ├── NoGroundPlaneError           a camera has no ground plane below it
+    └── MergeError                   two maps cannot be merged
 
-The exceptions take facts and compose the message, so that every message reads alike:
-what was expected, what came instead, where it was first seen, and what to do.
+The exceptions compose their messages from facts, in the same order: the expected value, the
+actual value, the first offending place, and a hint.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from typing import Any
 
 from groundmap.printable import MOST_OF_A_VALUE, printable
 
-MOST_OF_A_FACT = 1000  # characters of what was expected, or of a hint: some list all names
+MOST_OF_A_FACT = 1000  # characters of an expected value or a hint, which may list all names
 
 
 class FactualError(Exception):
-    r"""An exception that composes its message from facts, and survives pickling with them.
+    r"""Base of the exceptions of both packages, which compose their messages from facts.
 
-    Both packages' trees grow from it. Python would call the class again with the finished message;
-    a worker process that raises one would then die of a TypeError instead.
+    It can be pickled with its facts. Python's default would call the class with the complete
+    message as its only argument, and fail with a TypeError.
 
     Parameters
     ----------
     message : str
-        Unprintable characters are escaped, and what is too long is cut in the middle.
+        Unprintable characters are escaped, and a text that is too long is cut in the middle.
 
     Examples
     --------
@@ -45,11 +45,13 @@ class FactualError(Exception):
         super().__init__(printable(message))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Carry message and facts over as they are."""
-        return _again, (type(self), self.args, self.__dict__)
+        """Return the parts to restore the exception from, without a call of its class."""
+        return _restore, (type(self), self.args, self.__dict__)
 
 
-def _again(kind: type[FactualError], args: tuple[Any, ...], facts: dict[str, Any]) -> FactualError:
+def _restore(
+    kind: type[FactualError], args: tuple[Any, ...], facts: dict[str, Any]
+) -> FactualError:
     error = kind.__new__(kind, *args)
     error.args = args
     error.__dict__.update(facts)
@@ -57,19 +59,19 @@ def _again(kind: type[FactualError], args: tuple[Any, ...], facts: dict[str, Any
 
 
 class WrongValueError(FactualError, ValueError):
-    """A value is not what was asked for: what both packages' errors about input are.
+    """A value is invalid: base of the errors of both packages about input.
 
     Parameters
     ----------
     name : str
-        What the value is called where the caller wrote it.
+        Name of the value for the caller, such as that of an argument.
     expected, got : str
-        What it should have been, and what it is. Like all facts they are made printable, and
-        cut in the middle if they are too long for a sentence.
+        The expected and the actual value. Like all facts, they are made printable, and cut in the
+        middle if they are too long.
     where : str, optional
-        The first place that offends, such as ``"row 3"``.
+        The first offending place, such as ``"row 3"``.
     hint : str, optional
-        What to do about it.
+        A sentence about what to do.
     """
 
     def __init__(
@@ -87,11 +89,11 @@ class WrongValueError(FactualError, ValueError):
 
 
 class GroundmapError(FactualError):
-    """Base of every exception of this package."""
+    """Base of all exceptions of groundmap."""
 
 
 class InputError(GroundmapError, WrongValueError):
-    """A value is not what was asked for.
+    """An argument is invalid.
 
     Examples
     --------
@@ -101,15 +103,25 @@ class InputError(GroundmapError, WrongValueError):
 
 
 class SettingsError(InputError):
-    """A setting is unknown or out of its range."""
+    """A setting is unknown or out of range."""
 
 
 class CameraError(InputError):
-    """A rig or a pose that no camera can have."""
+    """A rig or a pose is not that of a camera."""
 
 
 class FileFormatError(InputError):
-    """A file does not say what its format asks for.
+    """A file is missing, unreadable or not in its format.
+
+    Parameters
+    ----------
+    path : path
+    expected, got : str
+        The expected and the actual content.
+    line : int, optional
+        The first offending line, from 1.
+    hint : str, optional
+        A sentence about what to do.
 
     Examples
     --------
@@ -132,8 +144,8 @@ class FileFormatError(InputError):
 
 
 class NoGroundPlaneError(GroundmapError):
-    """A camera with no ground plane below it."""
+    """A camera has no ground plane below it."""
 
 
 class MergeError(GroundmapError):
-    """Two maps that do not add up: other resolution, frame, origin or rule."""
+    """Two maps differ in resolution, frame, origin or update rule, and cannot be merged."""

@@ -1,4 +1,4 @@
-"""The mapper: from views to a confidence grid, one page long."""
+"""The mapper, which turns views into a confidence grid."""
 
 from __future__ import annotations
 
@@ -28,49 +28,63 @@ from groundmap.view.view import View
 
 @dataclass
 class MapperStats:
-    """What went in, over all views so far."""
+    """Statistics over all integrated views."""
 
-    views: int = 0
-    features_used: int = 0
-    features_dropped: Counter[str] = field(default_factory=Counter)  #: by reason
-    seen_through: int = 0  #: features behind a surface whose line of sight passes below its top
-    through_viewpoint: int = 0  #: edges nearer than min_range
+    views: int = 0  #: number of views
+    features_used: int = 0  #: number of features that became evidence
+    features_dropped: Counter[str] = field(default_factory=Counter)  #: number by reason
+    seen_through: int = 0  #: features behind a surface, with a line of sight below its top
+    through_viewpoint: int = 0  #: links and segments nearer than min_range
 
 
 @dataclass(frozen=True)
 class ViewParts:
-    """One view taken apart, as `GroundMapper.explain` returns it."""
+    """Intermediate results of the mapping of one view, in the order of the steps."""
 
-    ground_view: GroundView  #: features by height class
-    mesh: Mesh  #: their triangulation
-    surfaces: Surfaces
-    fan: SightFan
-    evidence: Evidence
+    ground_view: GroundView  #: features by height class, in the ground plane
+    mesh: Mesh  #: triangulation of the obstacle features
+    surfaces: Surfaces  #: links, segments and single features that end lines of sight
+    fan: SightFan  #: visible freespace by bearing
+    evidence: Evidence  #: update of the grid's cells
 
 
 class GroundMapper:
-    """Fuses views into a 2-D confidence grid (paper, sections 3, 5.2 and 7).
+    """Mapper that fuses views into a 2-D confidence grid (paper, sections 3, 5.2 and 7).
+
+    Each view is evidence for free cells, which its lines of sight pass over, and for non-free
+    cells, which its obstacle features are in. `integrate` adds the evidence of a view to `grid`.
 
     Parameters
     ----------
     stages : Stopwatch, optional
-        Stopwatch to count the time of each step with, if it is to be shared.
+        Stopwatch for the time of each step, if it is shared with other code.
     **settings
-        `groundmap.settings.MapperSettings`: ``resolution`` [m/cell], ``fusion``, ``uncertainty``,
+        Fields of `groundmap.MapperSettings`: ``resolution`` [m], ``fusion``, ``uncertainty``,
         ``max_range`` [m], ``step_height`` [m], ...
+
+    Attributes
+    ----------
+    grid : ConfidenceGrid
+        The map of all integrated views.
+    settings : MapperSettings
+    stats : MapperStats
+        Numbers of views and of used and dropped features.
+    stages : Stopwatch
+    changed : ndarray, shape (n, 2)
+        Cells ``[row, col]`` that the last view changed, for incremental planners.
 
     Raises
     ------
     SettingsError
-        An unknown setting (the nearest one is named), or a value out of range.
+        A setting is unknown (the nearest valid one is named) or out of range.
 
     Examples
     --------
     >>> from groundmap import StereoRig, View, fit_ground
     >>> from groundmap.view.frames import map_from_world
     >>> rig = StereoRig(fx=700.0, fy=700.0, cx=320.0, cy=240.0, baseline=0.5)
-    >>> seen = [(320.0, 250.0, 450.0)]  # one ground feature, 5 m ahead and 1.5 m below
-    >>> view = View.from_pixels(map_from_world(np.eye(4), "optical"), rig, points_px=seen)
+    >>> pixels = [(320.0, 250.0, 450.0)]  # one ground feature, 5 m ahead and 1.5 m below
+    >>> view = View.from_pixels(map_from_world(np.eye(4), "optical"), rig, points_px=pixels)
     >>> mapper = GroundMapper(resolution=0.2)
     >>> for view in fit_ground([view], camera_height=1.5):
     ...     mapper.integrate(view)
@@ -88,25 +102,23 @@ class GroundMapper:
         )
         self.stats = MapperStats()
         self.stages = stages or Stopwatch()
-        #: Cells of the grid that the last view changed, [row, col], shape (n, 2): what a planner
-        #: that replans as the map grows has to look at.
         self.changed: Ints = np.empty((0, 2), dtype=np.int64)
 
     def integrate(self, view: View) -> None:
-        """Add one view to the grid; a view that is refused leaves the grid as it was.
-
-        `changed` then holds the cells that the view changed.
+        """Add the evidence of one view to the grid; a refused view does not change the grid.
 
         Parameters
         ----------
         view : View
-            With its ground plane, as `groundmap.fit_ground` yields it.
+            With a ground plane, as from `groundmap.fit_ground`.
 
         Raises
         ------
         NoGroundPlaneError
-            The view has no plane, or one that is not below its camera; the camera looks at the
-            ground or the sky.
+            The view has no ground plane, or one that is not below its camera, or the camera looks
+            at the ground or the sky.
+        InputError
+            The view would need more cells than a map can have.
         """
         parts = self.explain(view)
         with self.stages.measure("fuse"):
@@ -123,7 +135,13 @@ class GroundMapper:
         self.stats.through_viewpoint += parts.surfaces.through_viewpoint
 
     def explain(self, view: View) -> ViewParts:
-        """Return what `integrate` would fuse, with every step on the way; changes nothing."""
+        """Return the evidence of one view with all intermediate results, without fusing it.
+
+        Parameters
+        ----------
+        view : View
+            With a ground plane, as from `groundmap.fit_ground`.
+        """
         with self.stages.measure("heights"):
             ground_view = flatten(view, self.settings, number=self.stats.views)
             ground_view = smooth_features(ground_view, self.settings)
@@ -144,7 +162,7 @@ def _pose2d(view: View) -> Floats:
 
 
 def warm_up(settings: MapperSettings) -> None:
-    """Compile (or load from the cache) all that `integrate` will need, on a view made up for it."""
+    """Compile the kernels of `GroundMapper.integrate`, or load them from the cache."""
     rig = StereoRig(fx=700.0, fy=700.0, cx=320.0, cy=240.0, baseline=0.5)
     ground, obstacle = (320.0, 250.0, 450.0), (420.0, 350.0, 240.0)
     view = View.from_pixels(

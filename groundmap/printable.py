@@ -1,27 +1,27 @@
-"""Text that is safe to print: no control characters, and of a bounded length."""
+"""Text that is safe to print: without control characters, and of a bounded length."""
 
 from __future__ import annotations
 
 import re
 import sys
 
-MOST_OF_A_VALUE = 300  # characters of a value, or of a file's name, in a sentence
-MOST_OF_A_SENTENCE = 3000  # characters; the longest lists of names have some 1,500
+MOST_OF_A_VALUE = 300  # characters of a value or a file name in a message
+MOST_OF_A_SENTENCE = 3000  # characters; the longest lists of names have about 1,500
 ELLIPSIS = "..."
 UNSTORABLE = re.compile("[\0\ud800-\udfff]")
 
 
 def printable(text: str, *, most: int = MOST_OF_A_SENTENCE, lines: bool = False) -> str:
-    r"""Return a text with its unprintable characters escaped, cut in the middle if too long.
+    r"""Return a text with unprintable characters escaped, cut in the middle if it is too long.
 
-    Unprintable are control and format characters (bidirectional marks among them), unpaired
-    surrogates, and all separators but the space.
+    Control and format characters (such as bidirectional marks), unpaired surrogates and all
+    separators except the space are unprintable.
 
     Parameters
     ----------
     text : str
     most : int, default 3000
-        Characters of the result, at most.
+        Largest length of the result [characters].
     lines : bool, default False
         Whether line feeds are kept.
 
@@ -32,7 +32,7 @@ def printable(text: str, *, most: int = MOST_OF_A_SENTENCE, lines: bool = False)
     >>> printable("abcdefghijklmnop", most=9)
     'abc...nop'
     """
-    # Cut before as well, so that the time does not depend on the text.
+    # Cut first, so that the time does not depend on the length of the text.
     marks = _cut(text, most)
     kept = "\n" if lines else ""
     escaped = (
@@ -43,16 +43,26 @@ def printable(text: str, *, most: int = MOST_OF_A_SENTENCE, lines: bool = False)
 
 
 def format_value(value: object, *, most: int = MOST_OF_A_VALUE) -> str:
-    r"""Return a value as Python writes it, printable and cut in the middle if too long.
+    r"""Return the repr of a value, printable and cut in the middle if it is too long.
+
+    Parameters
+    ----------
+    value : object
+    most : int, default 300
+        Largest length of the result [characters].
 
     Examples
     --------
-    >>> print(format_value("one\ttwo"), format_value(10**5000), format_value(list(range(1000)),
-    most=21), sep="; ") 'one\ttwo'; a number of more than 4300 digits; [0, 1, 2,...998, 999]
+    >>> print(format_value("one\ttwo"))
+    'one\ttwo'
+    >>> format_value(10**5000)
+    'a number of more than 4300 digits'
+    >>> format_value(list(range(1000)), most=21)
+    '[0, 1, 2,...998, 999]'
     """
     try:
         text = repr(value)
-    except ValueError:  # Python's own limit
+    except ValueError:  # the limit of Python
         return f"a number of more than {sys.get_int_max_str_digits()} digits"
     except RecursionError:
         return f"a deeply nested {type(value).__name__}"
@@ -60,7 +70,7 @@ def format_value(value: object, *, most: int = MOST_OF_A_VALUE) -> str:
 
 
 def is_plain(text: str) -> bool:
-    """Whether a text can be stored anywhere: without NUL and unpaired surrogates."""
+    """Return whether a text is without NUL and unpaired surrogates, and can be stored in files."""
     return not UNSTORABLE.search(text)
 
 

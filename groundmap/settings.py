@@ -1,4 +1,4 @@
-"""Settings: frozen, keyword-only, validated; an unknown key names the nearest valid one."""
+"""Settings classes: frozen, keyword-only and validated."""
 
 from __future__ import annotations
 
@@ -10,19 +10,24 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from groundmap.errors import SettingsError
 from groundmap.printable import format_value
 
-LARGEST_NUMBER = 1e9  # of any setting: squares and sums of such are still exact enough, and finite
-LARGEST = 1e4  # of lengths [m], ratios and angles: nothing that a rig sees needs more
-FINEST = 20_000  # cells, or samples, along max_range: more keep one view busy for minutes
+LARGEST_NUMBER = 1e9  # bound of all settings; their squares and sums stay finite and exact enough
+LARGEST = 1e4  # bound of lengths [m], ratios and angles
+FINEST = 20_000  # cells or samples along max_range; more would take minutes per view
 
 
 class Settings(BaseModel):
-    """Base of every settings class, in both packages.
+    """Base of the settings classes of both packages.
+
+    Parameters
+    ----------
+    **values
+        Fields of the class; missing ones get their defaults.
 
     Raises
     ------
     SettingsError
-        A key that does not exist (the nearest one is named), a value out of range, or values that
-        do not fit together (`check`).
+        A key is unknown (the nearest valid one is named), a value is out of range, or values are
+        inconsistent.
 
     Examples
     --------
@@ -60,10 +65,16 @@ unknown key. Did you mean 'resolution'?
         self.check()
 
     def check(self) -> None:
-        """Raise `SettingsError` where valid fields do not fit together; a class may override it."""
+        """Raise `SettingsError` if fields are inconsistent; overridden by subclasses."""
 
     def check_order(self, lower: str, upper: str) -> None:
-        """Raise `SettingsError` where the first of two fields is above the second."""
+        """Raise `SettingsError` if one field is above another.
+
+        Parameters
+        ----------
+        lower, upper : str
+            Names of the fields.
+        """
         least, most = getattr(self, lower), getattr(self, upper)
         if least > most:
             raise SettingsError(lower, f"at most {upper}, {most:g}", f"{least:g}")
@@ -75,84 +86,112 @@ def _nearest(key: str, known: list[str]) -> str:
 
 
 class MapperSettings(Settings):
-    """All that `groundmap.GroundMapper` can be told; lengths in metres, angles in radians.
+    """Settings of `groundmap.GroundMapper`.
+
+    Features of a view are dropped, or classified by their height above the ground plane. Obstacle
+    features are linked to surfaces, which end lines of sight and become non-free cells. Cells that
+    lines of sight pass over become free, and the evidence of all views is fused.
 
     Raises
     ------
     SettingsError
-        Besides unknown keys and values out of range: a range of more than 4,000 cells.
+        A key is unknown (the nearest valid one is named), a value is out of range, a lower bound
+        is above its upper bound, or `max_range` is longer than 20,000 cells.
+
+    Examples
+    --------
+    >>> MapperSettings(resolution=0.1, max_range=15.0).max_range
+    15.0
     """
 
-    resolution: float = Field(0.1524, gt=0, le=1000, description="size of a cell [m]; 6 inches")
-    mode: Literal["2d"] = Field("2d", description="ground plane (2d)")
-    frame: str = Field("map", description="name of the frame the map is in")
-    fusion: Literal["average", "capped"] = Field("average", description="how views add up")
+    resolution: float = Field(0.1524, gt=0, le=1000, description="side of a cell [m]; 6 inches")
+    mode: Literal["2d"] = Field("2d", description="kind of map: 2-D in the ground plane ('2d')")
+    frame: str = Field("map", description="name of the coordinate frame of the map")
+    fusion: Literal["average", "capped"] = Field(
+        "average",
+        description="update rule: 'average' of all views, or 'capped', which forgets old views",
+    )
     cap: int = Field(
-        50, ge=1, le=2**32 - 1, description="update count at which 'capped' starts to forget"
+        50, ge=1, le=2**32 - 1, description="update count from which 'capped' forgets old views"
     )
     uncertainty: Literal["ellipsoid", "radius", "none"] = Field(
-        "ellipsoid", description="how a surface spreads over the cells it may be in"
+        "ellipsoid",
+        description="spread of surfaces over cells: by their covariance ('ellipsoid'), equal in "
+        "all directions ('radius'), or 'none'",
     )
     spread_sigmas: float = Field(
-        2.0, ge=0, le=LARGEST, description="spread of a surface [standard deviations]"
+        2.0, ge=0, le=LARGEST, description="extent of this spread [standard deviations]"
     )
-    min_range: float = Field(0.3, gt=0, le=LARGEST, description="nearer features are dropped [m]")
-    max_range: float = Field(20.0, gt=0, le=LARGEST, description="farther features are dropped [m]")
-    step_height: float = Field(0.15, gt=0, le=LARGEST, description="what the robot drives over [m]")
+    min_range: float = Field(
+        0.3, gt=0, le=LARGEST, description="least horizontal distance of features [m]"
+    )
+    max_range: float = Field(
+        20.0, gt=0, le=LARGEST, description="largest horizontal distance of features [m]"
+    )
+    step_height: float = Field(
+        0.15, gt=0, le=LARGEST, description="height of steps that the robot can drive over [m]"
+    )
     robot_height: float = Field(
-        2.0, gt=0, le=LARGEST, description="higher features are overhead [m]"
+        2.0, gt=0, le=LARGEST, description="height of the robot; higher features are ignored [m]"
     )
     narrowest_footprint: float = Field(
         1.0, gt=0, description="width of the narrowest robot that will use the map [m]"
     )
     link_length: float = Field(
-        0.5, ge=0, le=LARGEST, description="links up to this length are believed [m]"
+        0.5, ge=0, le=LARGEST, description="largest length of a link between obstacle features [m]"
     )
     link_angle: float = Field(
-        0.04, ge=0, le=LARGEST, description="the same, per metre of range [rad]"
+        0.04,
+        ge=0,
+        le=LARGEST,
+        description="the same as an angle, which allows longer links far from the camera [rad]",
     )
     link_height: float = Field(
-        0.5, ge=0, le=LARGEST, description="height band of a point feature, for links [m]"
+        0.5, ge=0, le=LARGEST, description="largest height difference of linked features [m]"
     )
     doubt: float = Field(
         3.0,
         ge=1,
         le=LARGEST,
-        description="unbelieved links up to this many times as long still end sight",
+        description="links up to this many times too long end lines of sight, but are not mapped",
     )
     halo: float = Field(
         0.15,
         ge=0,
         le=LARGEST,
-        description="what a feature is on may go on as far as this beside it [m]",
+        description="distance beside a feature over which its surface may continue [m]",
     )
     smoothing: float = Field(
         0.25,
         ge=0,
         le=LARGEST,
-        description="features this near across the line of sight are averaged [m]",
+        description="distance across the line of sight over which features are smoothed [m]",
     )
     grant_height: float = Field(
         0.5,
         gt=0,
         le=LARGEST,
-        description="sight that comes down to this share of the camera's height grants freespace",
+        description="lines of sight to surfaces grant freespace if they end below this share of "
+        "the camera height",
     )
     sight_gap: float = Field(
-        0.8, ge=0, le=LARGEST, description="gap between lines of sight that counts as seen [m]"
+        0.8,
+        ge=0,
+        le=LARGEST,
+        description="largest gap between lines of sight that counts as observed [m]",
     )
     support_width: float = Field(
         0.3,
         gt=0,
         le=LARGEST,
-        description="half-width of the ground a ground feature vouches for [m]",
+        description="half-width of the observed ground around a ground feature [m]",
     )
     support_angle: float = Field(
-        0.05, gt=0, le=LARGEST, description="its upper bound as a bearing [rad]"
+        0.05, gt=0, le=LARGEST, description="upper bound of this half-width as an angle [rad]"
     )
 
     def check(self) -> None:
-        """Refuse ranges and heights out of order, and cells too small for the range."""
+        """Check the order of ranges and heights, and the number of cells along `max_range`."""
         self.check_order("min_range", "max_range")
         self.check_order("step_height", "robot_height")
         for name in ("resolution", "support_width"):
@@ -166,25 +205,39 @@ class MapperSettings(Settings):
 
 
 class GroundSettings(Settings):
-    """All that `groundmap.fit_ground` can be told."""
+    """Settings of `groundmap.fit_ground`.
+
+    Raises
+    ------
+    SettingsError
+        A key is unknown (the nearest valid one is named), a value is out of range, or
+        `lowest_camera` is above `highest_camera`.
+
+    Examples
+    --------
+    >>> GroundSettings(window=21, causal=True).window
+    21
+    """
 
     window: int = Field(
-        11, ge=1, le=10_000, description="views that one plane is fitted to [views]"
+        11, ge=1, le=10_000, description="number of views that each plane is fitted to"
     )
-    causal: bool = Field(False, description="use earlier views only, as a live mapper must")
+    causal: bool = Field(
+        False, description="whether a plane depends on earlier views only, as in live mapping"
+    )
     max_range: float = Field(
-        20.0, gt=0, le=LARGEST, description="farther features are left out [m]"
+        20.0, gt=0, le=LARGEST, description="largest horizontal distance of features [m]"
     )
     lowest_camera: float = Field(
-        0.1, gt=0, le=LARGEST, description="least height of the camera [m]"
+        0.1, gt=0, le=LARGEST, description="least height of the camera above the ground [m]"
     )
     highest_camera: float = Field(
-        5.0, gt=0, le=LARGEST, description="greatest height of the camera [m]"
+        5.0, gt=0, le=LARGEST, description="largest height of the camera above the ground [m]"
     )
     min_support: int = Field(
-        12, ge=3, le=1_000_000, description="least features on a plane [features]"
+        12, ge=3, le=1_000_000, description="least number of features on a plane"
     )
 
     def check(self) -> None:
-        """Refuse camera heights out of order."""
+        """Check the order of the camera heights."""
         self.check_order("lowest_camera", "highest_camera")

@@ -1,4 +1,4 @@
-"""Where the time goes: seconds by stage, each second counted once."""
+"""Computation time by stage."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ T = TypeVar("T")
 
 
 class Stopwatch:
-    """A stopwatch with named laps; a stage inside another one stops the outer one's clock.
+    """A stopwatch for named stages; a stage within another one pauses the outer one.
 
     Parameters
     ----------
     outside : str, optional
-        Stage that takes the time outside of all others; it is not counted unless told.
+        Stage for the time outside all others; default: this time is not counted.
 
     Examples
     --------
@@ -35,7 +35,7 @@ class Stopwatch:
 
     @contextmanager
     def measure(self, stage: str) -> Iterator[None]:
-        """Count the time inside to a stage."""
+        """Return a context whose time is added to a stage."""
         self._lap()
         self._running.append(stage)
         try:
@@ -45,7 +45,13 @@ class Stopwatch:
             self._running.pop()
 
     def each(self, stage: str, items: Iterable[T]) -> Iterator[T]:
-        """Yield `items`, counting the time that making each of them takes to a stage."""
+        """Yield items, and add the time that the iterator takes for each of them to a stage.
+
+        Parameters
+        ----------
+        stage : str
+        items : iterable
+        """
         source = iter(items)
         while True:
             with self.measure(stage):
@@ -56,7 +62,7 @@ class Stopwatch:
             yield item
 
     def stop(self) -> dict[str, float]:
-        """Return the seconds by stage so far."""
+        """Return the seconds by stage until now."""
         self._lap()
         return dict(self.seconds)
 

@@ -1,4 +1,4 @@
-"""Shape checks: what passes unchanged, and what is refused."""
+"""Checks of arrays: valid values pass unchanged, others are refused."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_values_of_the_right_shape_pass_unchanged(values: Floats) -> None:
         ([{}], (1,), r"v: expected numbers of shape \(1,\)"),
     ],
 )
-def test_other_shapes_and_no_numbers_are_refused(
+def test_other_shapes_and_values_that_are_not_numbers_are_refused(
     values: object, shape: tuple[int | None, ...], message: str
 ) -> None:
     with pytest.raises(InputError, match=message):
@@ -45,7 +45,7 @@ def test_an_empty_list_is_an_empty_table() -> None:
     assert as_floats("v", [], (None, 2, 3)).shape == (0, 2, 3)
 
 
-def test_an_empty_list_is_no_vector_of_fixed_length() -> None:
+def test_an_empty_list_is_not_a_vector_of_fixed_length() -> None:
     with pytest.raises(InputError, match=r"expected shape \(3,\), got shape \(0,\)"):
         as_floats("v", [], (3,))
 
@@ -67,6 +67,6 @@ def test_the_first_value_that_is_not_finite_is_named(
         check_finite("v", values, hint="Look there.")
 
 
-def test_the_place_in_a_vector_is_a_plain_number() -> None:
+def test_the_index_in_a_vector_is_a_single_number() -> None:
     with pytest.raises(InputError, match=r"v: expected finite numbers, got nan at index 1\.$"):
         check_finite("v", np.array([0.0, np.nan]))

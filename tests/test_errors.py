@@ -1,4 +1,4 @@
-"""The exceptions: what they are, and how their messages read."""
+"""The exceptions: their tree and their messages."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from groundmap.errors import (
     SettingsError,
 )
 
-SHARED = {errors.FactualError, errors.WrongValueError}  # with the planners' own tree
+SHARED = {errors.FactualError, errors.WrongValueError}  # bases of the tree of planners, too
 words = st.text(st.characters(exclude_categories=["C", "Z"]), min_size=1, max_size=20)
 
 
-def test_everything_raised_on_purpose_is_a_groundmap_error() -> None:
+def test_every_exception_is_a_groundmap_error() -> None:
     own = [
         value
         for name, value in vars(errors).items()
@@ -35,13 +35,13 @@ def test_everything_raised_on_purpose_is_a_groundmap_error() -> None:
 
 
 @pytest.mark.parametrize("error", [InputError, SettingsError, CameraError, FileFormatError])
-def test_wrong_values_are_value_errors_too(error: type[Exception]) -> None:
+def test_invalid_arguments_are_value_errors(error: type[Exception]) -> None:
     assert issubclass(error, InputError)
     assert issubclass(error, ValueError)
 
 
 @pytest.mark.parametrize("error", [NoGroundPlaneError, MergeError])
-def test_refused_scenes_and_maps_are_no_value_errors(error: type[Exception]) -> None:
+def test_refused_views_and_maps_are_not_value_errors(error: type[Exception]) -> None:
     assert not issubclass(error, ValueError)
 
 
@@ -55,7 +55,7 @@ def test_a_message_holds_every_fact_in_reading_order(
     assert facts == (name, expected, got, where, hint)
 
 
-def test_a_message_without_place_and_hint_leaves_no_gap() -> None:
+def test_a_message_without_place_and_hint_has_no_gap() -> None:
     assert str(InputError("fx", "a number", "a word")) == "fx: expected a number, got a word."
 
 
@@ -74,7 +74,7 @@ def test_a_file_error_names_file_and_line() -> None:
         NoGroundPlaneError("the camera looks at the sky"),
     ],
 )
-def test_an_error_survives_its_way_out_of_a_worker_process(error: GroundmapError) -> None:
+def test_an_error_can_be_pickled_with_its_facts(error: GroundmapError) -> None:
     again = pickle.loads(pickle.dumps(error))
     assert type(again) is type(error)
     assert str(again) == str(error)
@@ -82,7 +82,7 @@ def test_an_error_survives_its_way_out_of_a_worker_process(error: GroundmapError
 
 
 @given(st.text(min_size=1))
-def test_a_message_is_printable_whatever_its_facts_are(text: str) -> None:
+def test_a_message_with_any_facts_is_printable(text: str) -> None:
     for error in (InputError(text, text, text, where=text, hint=text), MergeError(text)):
         assert str(error).isprintable()
 

@@ -123,7 +123,7 @@ class Snapshot(NamedTuple):
 
 
 def snapshot(mapper: GroundMapper) -> Snapshot:
-    """Return all that a mapper has learnt, bit for bit."""
+    """Return the complete state of a mapper, bit for bit."""
     tiles: dict[tuple[int, ...], tuple[bytes, ...]] = {
         index: (tile.confidence.tobytes(), tile.count.tobytes(), tile.drop_offs.tobytes())
         for index, tile in mapper.grid.tiles()
@@ -155,7 +155,7 @@ def test_maps_of_split_views_merge_into_the_map_of_all(seed: int, side: list[boo
 
 
 def test_a_room_has_free_ground_walls_and_a_hole() -> None:
-    # The claims above would hold of a mapper that does nothing; this one does something.
+    # The claims above would also hold for a mapper that does nothing.
     rng = np.random.default_rng(1)
     mapper = mapped([room_view(rng) for _ in range(40)])
     window = mapper.grid.window()
@@ -236,15 +236,15 @@ def test_explaining_a_view_changes_nothing() -> None:
     assert mapper.stats.features_used == before.stats["features_used"] + parts.ground_view.used
 
 
-def test_the_mapper_names_the_cells_that_a_view_changed() -> None:
+def test_changed_holds_the_cells_that_the_last_view_changed() -> None:
     rng = np.random.default_rng(9)
     mapper = mapped([room_view(rng)])
     window = mapper.grid.window()
     mapper.integrate(room_view(rng))
     again = mapper.grid.window()
     assert again.count.shape == window.count.shape
-    spoken = (again.count != window.count) | (again.drop_offs != window.drop_offs)
-    expected = np.argwhere(spoken) + mapper.grid.cell_bounds()[0]
+    changed = (again.count != window.count) | (again.drop_offs != window.drop_offs)
+    expected = np.argwhere(changed) + mapper.grid.cell_bounds()[0]
     assert {*map(tuple, mapper.changed.tolist())} == {*map(tuple, expected.tolist())}
 
 
@@ -267,7 +267,7 @@ def test_features_are_smoothed_before_they_are_linked() -> None:
     )
 
 
-def test_an_empty_view_adds_a_pose_and_nothing_else() -> None:
+def test_an_empty_view_adds_only_a_pose() -> None:
     rng = np.random.default_rng(6)
     mapper = mapped([room_view(rng)])
     before = snapshot(mapper)

@@ -1,4 +1,4 @@
-"""What the two packages show on the outside, and what importing them costs."""
+"""The public names of the two packages, and the libraries that their import loads."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ HEAVY = ["matplotlib", "ompl"]
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_import_loads_no_heavy_library(package: str) -> None:
-    # In an interpreter of its own: this one may have loaded them for other tests.
+    # In a new interpreter: this one may have loaded them for other tests.
     script = f"import sys, {package}; print(*(set({HEAVY}) & sys.modules.keys()))"
     run = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
     assert run.stdout.split() == []
@@ -36,6 +36,6 @@ def test_public_names_exist_and_are_documented(package: str) -> None:
 
 
 def _documented(module: object, name: str) -> bool:
-    """Tell a docstring that somebody wrote from a dataclass's own, which is its signature."""
+    """Return whether a docstring is written, and not the signature that dataclasses generate."""
     text = getattr(module, name).__doc__ or ""
     return bool(text) and not text.startswith(f"{name}(")

@@ -1,4 +1,4 @@
-"""Held-out evaluation: a part of a log is mapped, the rest judges the map."""
+"""Held-out evaluation: maps of one part of a log are judged by the other part."""
 
 from groundmap.evaluate.protocols import Verdict, evaluate
 

@@ -1,7 +1,7 @@
-"""The judge: what features that a map never saw say about it.
+"""Figures of a map from held-out features, which were not mapped.
 
-It has its own fixed tolerances and reads nothing of the mapper's settings, so that no setting can
-flatter itself.
+The tolerances are fixed and independent of the mapper's settings, so that figures of maps with
+different settings can be compared.
 """
 
 from __future__ import annotations
@@ -18,24 +18,27 @@ from groundmap.grid.grid import ConfidenceGrid
 from groundmap.grid.window import CellState, GridWindow
 from groundmap.view.view import View
 
-JUDGED_RANGE = 15.0  # [m]
-GROUND_HEIGHT = 0.10  # [m], features within this of the plane are ground: less than a kerb
-OBSTACLE_HEIGHTS = (0.30, 1.80)  # [m], features between these are obstacles
-NEAR = 0.3  # [m], an obstacle this near to a non-free cell is on the map
-CELLS_AT_ONCE = 2**19  # around points; each takes some 100 bytes
-END_OF_SIGHT = 0.3  # [m], the last piece of a sight line is not judged
+JUDGED_RANGE = 15.0  # [m], farther features are left out
+GROUND_HEIGHT = 0.10  # [m], distance of ground features from the plane: less than a kerb
+OBSTACLE_HEIGHTS = (0.30, 1.80)  # [m], lowest and highest obstacle
+NEAR = 0.3  # [m], distance from a non-free cell within which an obstacle counts as mapped
+CELLS_AT_ONCE = 2**19  # cells of about 100 bytes that `cells_around` holds in memory
+END_OF_SIGHT = 0.3  # [m], the end of a sight line, which is not judged
 
 
 class HeldOut(NamedTuple):
-    """Features that the map never saw, as the judge sorts them; frame map."""
+    """Features that were not mapped, by kind."""
 
-    obstacles: Floats  #: shape (n, 2) [m]
-    grounds: Floats  #: shape (k, 2) [m]
-    viewpoints: Floats  #: shape (k, 2) [m], where each ground feature was seen from
+    obstacles: Floats  #: shape (n, 2) [m, map]
+    grounds: Floats  #: shape (k, 2) [m, map], ground features
+    viewpoints: Floats  #: shape (k, 2) [m, map], the camera position for each ground feature
 
 
 def sort_by_height(views: Iterable[View]) -> HeldOut:
-    """Sort the point features of views by the judge's heights; far ones are left out."""
+    """Return the obstacles and ground features among the point features of views.
+
+    Features farther than 15 m from the camera are left out, as are views without a ground plane.
+    """
     rows = list(_sort(views))
     obstacles, grounds, viewpoints = zip(*rows, strict=True) if rows else ((), (), ())
     none = np.empty((0, 2))
@@ -63,25 +66,25 @@ def _sort(views: Iterable[View]) -> Iterator[tuple[Floats, Floats, Floats]]:
 
 @dataclass(frozen=True)
 class Figures:
-    """What the held-out features say; shares are 0 to 1, pooled over the five folds."""
+    """Agreement of maps with held-out features: shares from 0 to 1, pooled over the five folds."""
 
-    obstacle_near_nonfree: float  #: obstacles within 0.3 m of a non-free cell
-    obstacle_in_free: float
-    obstacle_unknown: float  #: obstacles in unknown or contested cells
-    ground_free: float
-    ground_nonfree: float
-    ground_unknown: float
-    sightline_free: float  #: of the length of sight lines to ground features
-    sightline_crosses_nonfree: float  #: of the number of those lines
-    trajectory_free: float  #: of the cells driven over since the first known one
-    trajectory_nonfree: float
-    trajectory_unseen_start_m: float  #: [m] driven before the first known cell, mean of the folds
-    obstacles: int  #: features judged
-    grounds: int
+    obstacle_near_nonfree: float  #: share of obstacles within 0.3 m of a non-free cell
+    obstacle_in_free: float  #: share of obstacles in free cells
+    obstacle_unknown: float  #: share of obstacles in unknown or contested cells
+    ground_free: float  #: share of ground features in free cells
+    ground_nonfree: float  #: share of ground features in non-free cells
+    ground_unknown: float  #: share of ground features in unknown or contested cells
+    sightline_free: float  #: share of the length of sight lines to ground features in free cells
+    sightline_crosses_nonfree: float  #: share of these lines that cross a non-free cell
+    trajectory_free: float  #: share of free cells on the trajectory, from its first known cell
+    trajectory_nonfree: float  #: share of non-free cells on the same part of the trajectory
+    trajectory_unseen_start_m: float  #: [m], trajectory before its first known cell, mean of folds
+    obstacles: int  #: number of obstacles
+    grounds: int  #: number of ground features
 
 
 class Tally(NamedTuple):
-    """Sums that figures are made of; tallies of several folds add up field by field."""
+    """Sums behind the `Figures`; the tallies of several folds are added field by field."""
 
     obstacles: float = 0
     near_nonfree: float = 0
@@ -101,11 +104,11 @@ class Tally(NamedTuple):
     maps: float = 0
 
     def plus(self, other: Tally) -> Tally:
-        """Return the sums of both."""
+        """Return the field-wise sum of two tallies."""
         return Tally(*(a + b for a, b in zip(self, other, strict=True)))
 
     def figures(self) -> Figures:
-        """Return the shares; of nothing, 0."""
+        """Return the figures; shares without any data are 0."""
 
         def share(part: float, whole: float) -> float:
             return part / whole if whole else 0.0
@@ -128,13 +131,14 @@ class Tally(NamedTuple):
 
 
 def judge(grid: ConfidenceGrid, held_out: HeldOut, trajectory: Floats) -> Tally:
-    """Return the tally of one map.
+    """Return the tally of a map against held-out features.
 
     Parameters
     ----------
     grid : ConfidenceGrid
     held_out : HeldOut
     trajectory : ndarray, shape (n, 2) [m, map]
+        Positions of the base, which drove through free space.
     """
     window = grid.window()
     states = window.states()
@@ -150,11 +154,11 @@ def judge(grid: ConfidenceGrid, held_out: HeldOut, trajectory: Floats) -> Tally:
         obstacles=len(at_obstacle),
         near_nonfree=near_nonfree(window, states, held_out.obstacles).sum(),
         in_free=(at_obstacle == CellState.FREE).sum(),
-        obstacles_unknown=_not_known(at_obstacle).sum(),
+        obstacles_unknown=_is_unknown(at_obstacle).sum(),
         grounds=len(at_ground),
         grounds_free=(at_ground == CellState.FREE).sum(),
         grounds_nonfree=(at_ground == CellState.NONFREE).sum(),
-        grounds_unknown=_not_known(at_ground).sum(),
+        grounds_unknown=_is_unknown(at_ground).sum(),
         sight_m=sight_m,
         sight_free_m=sight_free_m,
         crossings=crossings,
@@ -166,28 +170,42 @@ def judge(grid: ConfidenceGrid, held_out: HeldOut, trajectory: Floats) -> Tally:
     )
 
 
-def _not_known(states: Bytes) -> Bools:
+def _is_unknown(states: Bytes) -> Bools:
     unknown: Bools = (states == CellState.UNKNOWN) | (states == CellState.CONTESTED)
     return unknown
 
 
 def _states_at(window: GridWindow, states: Bytes, points: Floats) -> Bytes:
-    """Return the states at positions; beyond the window all is unknown."""
-    found = np.full(len(points), CellState.UNKNOWN, dtype=np.uint8)
+    """Return the states at positions; cells beyond the window are unknown."""
+    at_points = np.full(len(points), CellState.UNKNOWN, dtype=np.uint8)
     if len(points):
         cells = window.world_to_cell(points)
         inside = window.contains(cells)
-        found[inside] = states[tuple(cells[inside].T)]
-    return found
+        at_points[inside] = states[tuple(cells[inside].T)]
+    return at_points
 
 
 def cells_around(
     window: GridWindow, points: Floats, radius: float, *, to_centre: bool = False
 ) -> Iterator[tuple[Ints, Floats]]:
-    """Yield the cells in a box around each point, (b, k, 2), and how far each is, (b, k) [m].
+    """Yield the cells in a box around each point, and their distances from the point.
 
-    In blocks of points, in their order, as small cells would fill the memory with the boxes of
-    all. Distances are to the cells' squares, or to their centres.
+    The points are processed in blocks of b points, in their order, to bound the memory.
+
+    Parameters
+    ----------
+    window : GridWindow
+    points : ndarray, shape (n, 2) [m, map]
+    radius : float [m]
+        The box contains all cells within this distance.
+    to_centre : bool, default False
+        Whether distances are to the centres of cells, not to their squares.
+
+    Yields
+    ------
+    cells : ndarray, shape (b, k, 2)
+        ``[row, col]``, also of cells outside the window.
+    distances : ndarray, shape (b, k) [m]
     """
     steps = int(np.ceil(radius / window.resolution)) + 1
     offsets = np.stack(np.meshgrid(*[np.arange(-steps, steps + 1)] * 2), axis=-1).reshape(-1, 2)
@@ -196,14 +214,22 @@ def cells_around(
         part = points[first : first + block]
         cells = window.world_to_cell(part)[:, None, :] + offsets
         centres = window.origin + (cells[..., ::-1] + 0.5) * window.resolution
-        apart = np.abs(part[:, None, :] - centres)
+        offset = np.abs(part[:, None, :] - centres)
         if not to_centre:
-            apart = np.maximum(apart - 0.5 * window.resolution, 0.0)
-        yield cells, np.hypot(apart[..., 0], apart[..., 1])
+            offset = np.maximum(offset - 0.5 * window.resolution, 0.0)
+        yield cells, np.hypot(offset[..., 0], offset[..., 1])
 
 
 def near_nonfree(window: GridWindow, states: Bytes, points: Floats) -> Bools:
-    """Return which points, shape (n, 2) [m, map], have a non-free cell within 0.3 m."""
+    """Return which points have a non-free cell within 0.3 m, shape (n,).
+
+    Parameters
+    ----------
+    window : GridWindow
+    states : ndarray, shape (rows, cols)
+        `CellState` of the cells of the window.
+    points : ndarray, shape (n, 2) [m, map]
+    """
     near = [np.empty(0, dtype=np.bool_)]
     for cells, distance in cells_around(window, points, NEAR):
         inside = window.contains(cells)
@@ -214,7 +240,7 @@ def near_nonfree(window: GridWindow, states: Bytes, points: Floats) -> Bools:
 
 
 def _along(window: GridWindow, points: Floats) -> Floats:
-    """Return places along a polyline, a quarter of a cell apart."""
+    """Return positions along a polyline, at most a quarter of a cell apart."""
     step = 0.25 * window.resolution
     pieces = [points[:1]]
     for a, b in pairwise(points):
@@ -224,7 +250,7 @@ def _along(window: GridWindow, points: Floats) -> Floats:
 
 
 def _sight_lines(window: GridWindow, states: Bytes, held_out: HeldOut) -> tuple[float, float, int]:
-    """Return the length of the sight lines, how much of it is free [m], how many cross non-free."""
+    """Return the length and free length of the sight lines [m], and how many cross non-free."""
     total, free, crossings = 0.0, 0.0, 0
     for start, end in zip(held_out.viewpoints, held_out.grounds, strict=True):
         distance = float(np.hypot(*(end - start)))
@@ -232,8 +258,8 @@ def _sight_lines(window: GridWindow, states: Bytes, held_out: HeldOut) -> tuple[
         if length <= 0:
             continue
         stop = start + (end - start) * (length / distance)
-        seen = _states_at(window, states, _along(window, np.array([start, stop])))
+        along = _states_at(window, states, _along(window, np.array([start, stop])))
         total += length
-        free += length * float((seen == CellState.FREE).mean())
-        crossings += int((seen == CellState.NONFREE).any())
+        free += length * float((along == CellState.FREE).mean())
+        crossings += int((along == CellState.NONFREE).any())
     return total, free, crossings

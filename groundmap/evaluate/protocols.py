@@ -1,6 +1,6 @@
-"""Held-out evaluation: map a part of a log, judge by the rest.
+"""Protocols of held-out evaluation: which part of a log is mapped, and which part is held out.
 
-The judge's ground planes are fitted to all views, held-out ones included.
+The heights of held-out features are measured from ground planes that are fitted to all views.
 """
 
 from __future__ import annotations
@@ -19,21 +19,22 @@ from groundmap.mapper import GroundMapper
 from groundmap.view.ground_fit import fit_ground
 from groundmap.view.view import View
 
-FOLDS = 5  # one in five is held out
-STAMP_RADIUS = 0.3  # [m], of the baseline's discs
+FOLDS = 5  # one fifth is held out
+STAMP_RADIUS = 0.3  # [m], of the discs of the baseline
 
 
 class Verdict(NamedTuple):
-    """One protocol's outcome."""
+    """Result of one protocol."""
 
     figures: Figures
     grid: ConfidenceGrid  #: the map of the last fold
-    held_out: HeldOut  #: what that map was judged by
+    held_out: HeldOut  #: the held-out features of the last fold
 
 
-# Fold, number of the view, view: what of it is mapped, what is held out.
+# (fold, index of the view, view) -> (mapped part, held-out part).
 Split = Callable[[int, int, View], tuple[View | None, View | None]]
-Mapped = Callable[[Iterable[View], dict[str, Any], dict[str, Any]], ConfidenceGrid]
+# (views, mapper settings, arguments of fit_ground) -> map.
+MakeMap = Callable[[Iterable[View], dict[str, Any], dict[str, Any]], ConfidenceGrid]
 
 
 def evaluate(
@@ -44,41 +45,48 @@ def evaluate(
     camera_height: float | None = None,
     **settings: Any,
 ) -> dict[str, Verdict]:
-    """Map a part of a log and judge the map by the rest, in three ways and with a baseline.
+    """Return figures of maps of a part of a log, judged by the held-out part.
 
-    ``views`` holds out every fifth view; ``ids`` holds out a fifth of the landmarks, in all views;
-    ``thin`` maps a fifth of the landmarks and judges by another fifth; ``stamping`` is ``views``
-    with a map that only stamps a disc at each feature. Each is done five times, with another
-    fifth held out, and the five are pooled: no choice of the fifth can flatter.
+    The protocol ``views`` holds out every fifth view, ``ids`` a fifth of the landmarks in all
+    views. ``thin`` maps a fifth of the landmarks and holds out another fifth. The baseline
+    ``stamping`` holds out views, and maps a disc at each feature. Each protocol holds out each
+    fifth in turn and pools the five results, which then do not depend on the choice of the fifth.
 
     Parameters
     ----------
     views : iterable of View
-    watch : callable
+        All views of a log; a ground plane is fitted to them anew.
+    watch : callable, default iter
         Wraps the list of steps, to show progress.
     ground : dict, optional
-        `groundmap.settings.GroundSettings` of the maps; the judge keeps its own.
+        Fields of `groundmap.GroundSettings` for the maps; the heights of held-out features are
+        determined with the defaults.
     camera_height : float, optional [m]
-        Level ground that far below the camera, for the maps and the judge, instead of fitted
-        planes.
+        Use level ground this far below the left camera, for maps and held-out features, instead of
+        fitting planes.
     **settings
-        `groundmap.settings.MapperSettings`.
+        Fields of `groundmap.MapperSettings`.
+
+    Returns
+    -------
+    dict of str to Verdict
+        By protocol: ``views``, ``ids``, ``thin`` and ``stamping``.
 
     Raises
     ------
     InputError
-        Fewer than five views, or landmarks without ids.
+        There are fewer than five views, or points without a landmark id.
     """
-    judged = list(fit_ground(views, camera_height=camera_height))
-    standing = {**(ground or {}), "camera_height": camera_height}
-    _check_log(judged)
-    trajectory = np.array([view.T_map_base[:2, 3] for view in judged])
+    given = list(fit_ground(views, camera_height=camera_height))
+    ground = {**(ground or {}), "camera_height": camera_height}
+    _check_log(given)
+    trajectory = np.array([view.T_map_base[:2, 3] for view in given])
     tallies = dict.fromkeys(PROTOCOLS, Tally())
     verdicts = {}
     for name, fold in watch([(name, fold) for name in PROTOCOLS for fold in range(FOLDS)]):
-        split, mapped_by = PROTOCOLS[name]
-        parts = [split(fold, number, view) for number, view in enumerate(judged)]
-        grid = mapped_by((view for view, _ in parts if view is not None), settings, standing)
+        split, make_map = PROTOCOLS[name]
+        parts = [split(fold, number, view) for number, view in enumerate(given)]
+        grid = make_map((view for view, _ in parts if view is not None), settings, ground)
         held_out = sort_by_height(view for _, view in parts if view is not None)
         tallies[name] = tallies[name].plus(judge(grid, held_out, trajectory))
         verdicts[name] = Verdict(tallies[name].figures(), grid, held_out)
@@ -88,43 +96,43 @@ def evaluate(
 def _check_log(views: list[View]) -> None:
     if len(views) < FOLDS:
         raise InputError("views", f"at least {FOLDS} views", str(len(views)))
-    nameless = [number for number, view in enumerate(views) if (view.points.ids < 0).any()]
-    if nameless:
+    without_ids = [number for number, view in enumerate(views) if (view.points.ids < 0).any()]
+    if without_ids:
         raise InputError(
             "views",
             "a landmark id for every point",
             "points without one",
-            where=f"view {nameless[0]}",
-            hint="Without ids, a landmark can't be held out of all views that saw it.",
+            where=f"view {without_ids[0]}",
+            hint="Ids are needed to hold a landmark out of all views that observe it.",
         )
 
 
 def _folds(view: View) -> Ints:
-    """Return the fold of each landmark, the same in every view and in no order of the ids."""
+    """Return the fold of each landmark: a hash of its id, the same in every view."""
     scrambled = view.points.ids.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
     return ((scrambled >> np.uint64(32)) % np.uint64(FOLDS)).astype(np.int64)
 
 
-def _by_view(fold: int, number: int, view: View) -> tuple[View | None, View | None]:
+def _split_views(fold: int, number: int, view: View) -> tuple[View | None, View | None]:
     return (None, view) if number % FOLDS == fold else (view, None)
 
 
-def _by_id(fold: int, number: int, view: View) -> tuple[View | None, View | None]:
+def _split_landmarks(fold: int, number: int, view: View) -> tuple[View | None, View | None]:
     folds = _folds(view)
-    return _only(view, folds != fold), _only(view, folds == fold)
+    return _select(view, folds != fold), _select(view, folds == fold)
 
 
-def _thin(fold: int, number: int, view: View) -> tuple[View | None, View | None]:
+def _split_thin(fold: int, number: int, view: View) -> tuple[View | None, View | None]:
     folds = _folds(view)
-    return _only(view, folds == (fold + 1) % FOLDS), _only(view, folds == fold)
+    return _select(view, folds == (fold + 1) % FOLDS), _select(view, folds == fold)
 
 
-def _only(view: View, keep: Bools) -> View:
+def _select(view: View, keep: Bools) -> View:
     return replace(view, points=view.points.select(keep))
 
 
 def _map(views: Iterable[View], settings: dict[str, Any], ground: dict[str, Any]) -> ConfidenceGrid:
-    """Map as a user would: the ground, too, is fitted to what is mapped, and nothing else."""
+    """Return a map of views, with ground planes fitted to these views alone."""
     mapper = GroundMapper(**settings)
     for view in fit_ground(views, **ground):
         mapper.integrate(view)
@@ -134,19 +142,17 @@ def _map(views: Iterable[View], settings: dict[str, Any], ground: dict[str, Any]
 def _stamp(
     views: Iterable[View], settings: dict[str, Any], _ground: dict[str, Any]
 ) -> ConfidenceGrid:
-    """Map without triangulation: free discs at ground features, non-free ones at obstacles."""
+    """Return a map of discs, free at ground features and non-free at obstacles."""
     grid = GroundMapper(**settings).grid
     for view in views:
-        seen = sort_by_height([view])
-        places = np.concatenate([seen.grounds, seen.obstacles])
-        if len(places) == 0:
+        features = sort_by_height([view])
+        xy = np.concatenate([features.grounds, features.obstacles])
+        if len(xy) == 0:
             continue
         reach = STAMP_RADIUS + grid.resolution
-        window = grid.window(
-            np.concatenate([places.min(axis=0) - reach, places.max(axis=0) + reach])
-        )
+        window = grid.window(np.concatenate([xy.min(axis=0) - reach, xy.max(axis=0) + reach]))
         z = np.zeros(window.count.shape, dtype=np.float32)
-        for points, value in ((seen.grounds, -1.0), (seen.obstacles, 1.0)):
+        for points, value in ((features.grounds, -1.0), (features.obstacles, 1.0)):
             for cells, distance in cells_around(window, points, STAMP_RADIUS, to_centre=True):
                 z[tuple(cells[distance <= STAMP_RADIUS].T)] = value
         lower = np.rint((window.origin - grid.origin) / grid.resolution).astype(np.int64)[::-1]
@@ -154,9 +160,9 @@ def _stamp(
     return grid
 
 
-PROTOCOLS: dict[str, tuple[Split, Mapped]] = {
-    "views": (_by_view, _map),
-    "ids": (_by_id, _map),
-    "thin": (_thin, _map),
-    "stamping": (_by_view, _stamp),
+PROTOCOLS: dict[str, tuple[Split, MakeMap]] = {
+    "views": (_split_views, _map),
+    "ids": (_split_landmarks, _map),
+    "thin": (_split_thin, _map),
+    "stamping": (_split_views, _stamp),
 }

@@ -1,1 +1,1 @@
-"""Files opened, read and written whole: documents, arrays, our own archives."""
+"""Reading and writing of whole files: documents, arrays, and archives of this package."""

@@ -1,7 +1,7 @@
-"""One-file archives of arrays with a header: no pickle, atomic, versioned.
+"""Archives of arrays with a versioned header, written atomically and without pickle.
 
-The file is a zip of ``.npy`` members (an ``.npz``), so NumPy alone can open it; the member
-``header`` is JSON.
+An archive is a zip of ``.npy`` members (an ``.npz``), which NumPy can open; the member ``header``
+is JSON.
 """
 
 from __future__ import annotations
@@ -21,24 +21,38 @@ import numpy.typing as npt
 from groundmap.errors import FileFormatError
 from groundmap.files.array_files import read_arrays
 from groundmap.files.documents import WrongDocumentError, parse_json
-from groundmap.files.opening import check_name, reason_of
+from groundmap.files.opening import INVALID_NAME, check_name, reason_of
 
-TEMPORARY = ".groundmap-"  # what the names of files begin with until they are whole
+TEMPORARY = ".groundmap-"  # prefix of the names of files that are being written
 
 
 def write_atomically(path: str | PathLike[str], write: Callable[[IO[bytes]], object]) -> None:
-    """Call `write` on a temporary file beside `path`, then rename it: all or nothing."""
+    """Write a file completely or not at all: to a temporary file that is then renamed.
+
+    Parameters
+    ----------
+    path : path
+    write : callable
+        Writes the content to the binary stream that it is called with.
+
+    Raises
+    ------
+    FileFormatError
+        The name is invalid, or that of a device, a pipe or the like.
+    OSError
+        The file cannot be written.
+    """
     target = Path(path)
     check_name(target, "a file that can be written")
     _check_regular(target)
-    # Its name does not hold the target's, which may be as long as the system takes.
+    # The temporary name does not contain that of the target, which may have the maximum length.
     handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=TEMPORARY)
     try:
         with os.fdopen(handle, "wb") as stream:
             write(stream)
             stream.flush()
             os.fsync(stream.fileno())
-        # mkstemp makes private files; a map is as readable as any other file of its owner.
+        # mkstemp makes private files; a map gets the permissions of any new file.
         umask = os.umask(0)
         os.umask(umask)
         os.chmod(temporary, 0o666 & ~umask)
@@ -53,7 +67,15 @@ def write_archive(
     header: Mapping[str, Any],
     arrays: Mapping[str, npt.NDArray[np.generic]],
 ) -> None:
-    """Write a header and arrays to one compressed file, atomically."""
+    """Write a header and arrays to a compressed archive, atomically.
+
+    Parameters
+    ----------
+    path : path
+    header : mapping
+        JSON values by key, with ``format`` and ``version`` among them.
+    arrays : mapping of str to ndarray
+    """
     text = np.array(json.dumps(header))
 
     def write(stream: IO[bytes]) -> None:
@@ -65,17 +87,25 @@ def write_archive(
 def read_archive(
     path: str | PathLike[str], expected_format: str, newest_version: int
 ) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
-    """Return header and arrays of a file that `write_archive` wrote.
+    """Return the header and the arrays of an archive from `write_archive`.
+
+    Parameters
+    ----------
+    path : path
+    expected_format : str
+        ``format`` of the header.
+    newest_version : int
+        Newest ``version`` that the caller can read.
 
     Raises
     ------
     FileFormatError
-        Missing, no archive, truncated, of another format or of a newer version.
+        The file is missing, damaged, not an archive, of another format, or of a newer version.
     """
     arrays = read_arrays(path, f"a {expected_format} file")
     try:
         header = parse_json(str(arrays.pop("header")))
-    except (KeyError, WrongDocumentError):  # some other program's archive
+    except (KeyError, WrongDocumentError):  # an archive of another program
         header = None
     if not isinstance(header, dict) or header.get("format") != expected_format:
         raise FileFormatError(path, f"a {expected_format} file", "another kind of archive")
@@ -95,16 +125,21 @@ def read_archive(
 def check_writable(
     path: str | PathLike[str], *, sources: Iterable[str | PathLike[str]] = ()
 ) -> None:
-    """Check that a file can be written there, before the work whose result it is to hold.
+    """Check that a file can be written, before the computation of its content.
 
-    An empty file is made in its folder, and removed: nothing else shows what may be written.
+    An empty file is created in the same folder and removed, since only this shows permissions.
+
+    Parameters
+    ----------
+    path : path
+    sources : iterable of path
+        Input files of the computation.
 
     Raises
     ------
     FileFormatError
-        A folder that does not exist or can't be written to, a path that is a folder, a device or
-        the like, a name that no file can have, or that of one of the files `sources` that the
-        work reads.
+        The folder does not exist or is not writable, the name is invalid, or the path is that of a
+        folder, a device or the like, or of one of the `sources`.
     """
     target = Path(path)
     try:
@@ -113,19 +148,19 @@ def check_writable(
             pass
     except OSError as error:
         raise FileFormatError(target, "a file that can be written", reason_of(error)) from error
-    except (ValueError, RuntimeError) as error:  # NUL or an unpaired surrogate; links in a circle
+    except (ValueError, RuntimeError) as error:  # NUL or an unpaired surrogate; a loop of links
         if isinstance(error, FileFormatError):
             raise
-        raise FileFormatError(target, "a file that can be written", "no such name") from error
+        raise FileFormatError(target, "a file that can be written", INVALID_NAME) from error
 
 
 def _check_target(target: Path, sources: Iterable[str | PathLike[str]]) -> None:
     with suppress(FileNotFoundError, NotADirectoryError):
-        target.lstat()  # says what no name can be, such as one that is too long
+        target.lstat()  # raises for invalid names, such as one that is too long
     if target.is_dir():
         raise FileFormatError(target, "a file name", "a folder")
     if target.resolve() in [Path(source).resolve() for source in sources]:
-        raise FileFormatError(target, "another file than the one that is read", "the same")
+        raise FileFormatError(target, "a file other than the input", "an input file")
     _check_regular(target)
     if not target.parent.is_dir():
         raise FileFormatError(
@@ -134,6 +169,6 @@ def _check_target(target: Path, sources: Iterable[str | PathLike[str]]) -> None:
 
 
 def _check_regular(target: Path) -> None:
-    """Refuse to replace a device, a pipe or the like by a file."""
+    """Check that writing would not replace a device, a pipe or the like."""
     if target.exists() and not (target.is_file() or target.is_dir()):
         raise FileFormatError(target, "a file, or the name of a new one", "something else")

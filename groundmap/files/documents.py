@@ -1,7 +1,7 @@
-"""TOML, YAML and JSON that others wrote, as plain values of bounded size and depth.
+"""TOML, YAML and JSON files of any origin, read as plain values of bounded size and depth.
 
-What these functions return holds nothing but dictionaries with text for keys, lists, text, truth
-values, None and numbers; whole numbers have at most 64 bits, and text can be part of a file's name.
+The values are dictionaries with text keys, lists, text, truth values, None and numbers. Whole
+numbers have at most 64 bits, and text has no characters that file names cannot have.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from groundmap.files.opening import read_file
 from groundmap.printable import is_plain
 
 MOST_BYTES = {"TOML": 2**20, "YAML": 2**16, "JSON": 2**24}
-MOST_VALUES = {"TOML": 10**6, "YAML": 10**5, "JSON": 10**7}  # an alias counts as what it stands for
+MOST_VALUES = {"TOML": 10**6, "YAML": 10**5, "JSON": 10**7}  # aliases in YAML count in full
 DEEPEST = 64  # levels of nesting
-MOST_PARTS = 32  # of a dotted key: the time that tomllib takes grows with the cube of their number
+MOST_PARTS = 32  # of a dotted key; the time of tomllib grows with the cube of their number
 DOTTED_KEY = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}")
 
 
 class WrongDocumentError(ValueError):
-    """A text that is no such document; the message says what it is instead."""
+    """A text that is not a valid document; the message describes what it is instead."""
 
     def __init__(self, got: str, *, line: int | None = None) -> None:
         super().__init__(got)
@@ -34,18 +34,19 @@ class WrongDocumentError(ValueError):
 
 
 def read_toml(path: str | PathLike[str], expected: str = "a TOML file") -> dict[str, Any]:
-    """Return the content of a TOML file; see the module for what it can hold.
+    """Return the content of a TOML file; the module describes the possible values.
 
     Parameters
     ----------
     path : path
     expected : str
-        What the file should be, for the error.
+        Kind of file that is expected, for error messages.
 
     Raises
     ------
     FileFormatError
-        A file that is missing, too large, or no TOML; too deep; a value of another kind.
+        The file is missing, too large or not TOML, is nested too deeply, or has a value of another
+        kind.
     """
     text = _text(path, "TOML", expected)
     try:
@@ -60,15 +61,20 @@ def read_toml(path: str | PathLike[str], expected: str = "a TOML file") -> dict[
 
 
 def read_yaml(path: str | PathLike[str], expected: str = "a YAML file") -> Any:
-    """Return the content of a YAML file, its scalars as the text that stands there.
+    """Return the content of a YAML file, with all scalars as text.
 
-    Text only, as libraries for C++ have it: what a scalar means is for its reader to say, and
-    tags and the many forms of numbers and dates are no concern of this function.
+    The caller converts scalars to numbers, as with YAML libraries for C++; tags are ignored.
+
+    Parameters
+    ----------
+    path : path
+    expected : str
+        Kind of file that is expected, for error messages.
 
     Raises
     ------
     FileFormatError
-        As of `read_toml`.
+        The file is missing, too large or not YAML, or is nested too deeply.
     """
     text = _text(path, "YAML", expected)
     try:
@@ -80,12 +86,18 @@ def read_yaml(path: str | PathLike[str], expected: str = "a YAML file") -> Any:
 
 
 def read_json(path: str | PathLike[str], expected: str = "a JSON file") -> Any:
-    """Return the content of a JSON file; see the module for what it can hold.
+    """Return the content of a JSON file; the module describes the possible values.
+
+    Parameters
+    ----------
+    path : path
+    expected : str
+        Kind of file that is expected, for error messages.
 
     Raises
     ------
     FileFormatError
-        As of `read_toml`.
+        The file is missing, too large or not JSON, or is nested too deeply.
     """
     text = _text(path, "JSON", expected)
     try:
@@ -95,12 +107,12 @@ def read_json(path: str | PathLike[str], expected: str = "a JSON file") -> Any:
 
 
 def parse_json(text: str) -> Any:
-    """Return what a text says in JSON; see the module for what it can hold.
+    """Return the content of a JSON text; the module describes the possible values.
 
     Raises
     ------
     WrongDocumentError
-        No JSON; too deep; a value of another kind.
+        The text is not JSON, is nested too deeply, or has a value of another kind.
 
     Examples
     --------
@@ -129,7 +141,7 @@ def _parse_text(parse: Any, text: str) -> Any:
     try:
         return parse(text)
     except RecursionError as error:
-        raise WrongDocumentError(f"more than {DEEPEST} levels") from error
+        raise WrongDocumentError(f"more than {DEEPEST} levels of nesting") from error
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = None if mark is None else mark.line + 1
@@ -139,29 +151,29 @@ def _parse_text(parse: Any, text: str) -> Any:
         ) from error
     except json.JSONDecodeError as error:
         raise WrongDocumentError(f"something else ({error.msg})", line=error.lineno) from error
-    except ValueError as error:  # tomllib's own, dates that don't exist, numbers of many digits
+    except ValueError as error:  # faults in TOML, nonexistent dates, numbers with many digits
         raise WrongDocumentError(f"something else ({error})") from error
 
 
 def _check(content: Any, kind: str) -> None:
     """Check every value, without recursion."""
-    left: list[tuple[Any, int]] = [(content, 0)]
+    pending: list[tuple[Any, int]] = [(content, 0)]
     count = 0
-    while left:
-        value, depth = left.pop()
+    while pending:
+        value, depth = pending.pop()
         count += 1
         if count > MOST_VALUES[kind]:
             raise WrongDocumentError(f"more than {MOST_VALUES[kind]} values")
         if isinstance(value, dict):
-            inside: list[Any] = [*value, *value.values()]
+            parts: list[Any] = [*value, *value.values()]
         elif isinstance(value, list):
-            inside = value
+            parts = value
         else:
             _check_scalar(value)
             continue
         if depth == DEEPEST:
-            raise WrongDocumentError(f"more than {DEEPEST} levels")
-        left.extend((part, depth + 1) for part in inside)
+            raise WrongDocumentError(f"more than {DEEPEST} levels of nesting")
+        pending.extend((part, depth + 1) for part in parts)
 
 
 def _check_scalar(value: Any) -> None:

@@ -1,4 +1,4 @@
-"""Opening files that others wrote: whatever is wrong with a name or a file is said by one error."""
+"""Opening of input files; every fault of a name or a file is a `FileFormatError`."""
 
 from __future__ import annotations
 
@@ -10,24 +10,26 @@ from typing import BinaryIO
 
 from groundmap.errors import FileFormatError
 
+INVALID_NAME = "an invalid file name"
+
 
 def open_file(path: str | PathLike[str], expected: str = "a readable file") -> BinaryIO:
-    """Open a file to read its bytes.
+    """Return a stream of the bytes of a file.
 
     Parameters
     ----------
     path : path
     expected : str
-        What the file should be, for the error.
+        Kind of file that is expected, for error messages.
 
     Raises
     ------
     FileFormatError
-        A name that no file can have, or a file that is missing, is a folder or can't be read.
+        The name is invalid, or the file is missing, is a folder or cannot be read.
     """
     try:
         stream = open(path, "rb")  # noqa: SIM115  # the caller closes it
-        if stat.S_ISDIR(os.fstat(stream.fileno()).st_mode):  # some systems open folders, too
+        if stat.S_ISDIR(os.fstat(stream.fileno()).st_mode):  # some systems also open folders
             stream.close()
             raise IsADirectoryError
         return stream
@@ -38,16 +40,24 @@ def open_file(path: str | PathLike[str], expected: str = "a readable file") -> B
     except OSError as error:
         raise FileFormatError(path, expected, reason_of(error)) from error
     except ValueError as error:  # NUL, or an unpaired surrogate
-        raise FileFormatError(path, expected, "a name that no file can have") from error
+        raise FileFormatError(path, expected, INVALID_NAME) from error
 
 
 def open_text(path: str | PathLike[str], expected: str = "a readable file") -> io.TextIOWrapper:
-    """Open a text file, whatever bytes it holds; a byte order mark is passed over.
+    """Return a stream of the text of a file.
+
+    A byte order mark is skipped, and bytes that are not UTF-8 become replacement characters.
+
+    Parameters
+    ----------
+    path : path
+    expected : str
+        Kind of file that is expected, for error messages.
 
     Raises
     ------
     FileFormatError
-        As of `open_file`.
+        The file cannot be opened; see `open_file`.
     """
     return io.TextIOWrapper(open_file(path, expected), encoding="utf-8-sig", errors="replace")
 
@@ -59,14 +69,14 @@ def read_file(path: str | PathLike[str], expected: str, *, most: int) -> bytes:
     ----------
     path : path
     expected : str
-        What the file should be, for the error.
+        Kind of file that is expected, for error messages.
     most : int
         Largest size [bytes].
 
     Raises
     ------
     FileFormatError
-        As of `open_file`, or a file that is larger.
+        The file cannot be opened (see `open_file`), or is larger.
     """
     with open_file(path, expected) as stream:
         try:
@@ -74,17 +84,23 @@ def read_file(path: str | PathLike[str], expected: str, *, most: int) -> bytes:
         except OSError as error:
             raise FileFormatError(path, expected, reason_of(error)) from error
     if len(content) > most:
-        raise FileFormatError(path, f"{expected} of at most {most} bytes", "a larger one")
+        raise FileFormatError(path, f"{expected} of at most {most} bytes", "a larger file")
     return content
 
 
 def check_name(path: str | PathLike[str], expected: str) -> None:
-    """Check that a file or folder can have such a name, before it is asked for or made.
+    """Check that a name is valid for a file or folder, which need not exist.
+
+    Parameters
+    ----------
+    path : path
+    expected : str
+        Kind of file that is expected, for error messages.
 
     Raises
     ------
     FileFormatError
-        A name that the system takes for no file or folder, such as one with NUL in it.
+        The name is invalid, such as one that is too long or has NUL in it.
     """
     try:
         os.lstat(path)
@@ -93,9 +109,9 @@ def check_name(path: str | PathLike[str], expected: str) -> None:
     except OSError as error:
         raise FileFormatError(path, expected, reason_of(error)) from error
     except ValueError as error:  # NUL, or an unpaired surrogate
-        raise FileFormatError(path, expected, "a name that no file can have") from error
+        raise FileFormatError(path, expected, INVALID_NAME) from error
 
 
 def reason_of(error: OSError) -> str:
-    """Return what the system says, in lower case, such as ``permission denied``."""
+    """Return the message of the operating system in lower case, such as ``permission denied``."""
     return (error.strerror or str(error)).lower()

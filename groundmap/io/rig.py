@@ -1,41 +1,51 @@
-"""``rig.toml``: the stereo rig of a folder of views, and the world its poses are given in."""
+"""``rig.toml``: the stereo rig of a folder of views, and the world frame of its poses."""
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+from pydantic import ConfigDict, Field
+
 from groundmap.errors import FileFormatError, InputError
 from groundmap.files.documents import read_toml
+from groundmap.settings import Settings
 from groundmap.view.frames import WorldConvention
 from groundmap.view.stereo_rig import StereoRig
 
-REQUIRED = ("world", "fx", "fy", "cx", "cy", "baseline")
-OPTIONAL = ("pixel_noise_px", "T_base_camera")
-WORLDS: tuple[WorldConvention, ...] = ("optical", "rep103")
+
+class RigFile(Settings):
+    """The keys of ``rig.toml``; `groundmap.StereoRig` checks the ranges of the numbers."""
+
+    model_config = ConfigDict(strict=True)  # text and truth values are not numbers
+
+    world: WorldConvention = Field(description="axes of the world frame of the poses")
+    fx: float = Field(description="focal length [px]")
+    fy: float = Field(description="focal length [px]")
+    cx: float = Field(description="column of the principal point of the left image [px]")
+    cy: float = Field(description="row of the principal point [px]")
+    baseline: float = Field(description="distance between the cameras [m]")
+    pixel_noise_px: float = Field(
+        0.5, description="standard deviation of a matched pixel coordinate [px]"
+    )
+    T_base_camera: list[list[float]] | None = Field(
+        None, description="pose of the left camera in base_link, 4 x 4; default: the identity"
+    )
 
 
 def read_rig(path: Path) -> tuple[StereoRig, WorldConvention]:
-    """Read a rig and its world.
+    """Return the rig and the world convention of a file.
 
     Raises
     ------
     FileFormatError
-        No TOML; a key that is missing or unknown (the nearest one is named); a value that no rig
-        can have.
+        The file is not TOML, a key is missing or unknown (the nearest valid key is named), or a
+        value is out of range.
     """
-    values = read_toml(path)
-    _check_keys(path, values)
-    world = values.pop("world")
-    if world not in WORLDS:
-        raise FileFormatError(path, "world to be 'optical' or 'rep103'", repr(world))
-    for key, value in values.items():
-        if key != "T_base_camera" and (
-            isinstance(value, bool) or not isinstance(value, int | float)
-        ):
-            raise FileFormatError(path, f"{key} to be a number", repr(value))
+    content = read_toml(path)
     try:
+        values = RigFile(**content).model_dump(exclude_none=True)
+        world = values.pop("world")
         return StereoRig(**values), world
     except InputError as error:
         raise FileFormatError(
@@ -53,19 +63,14 @@ def rig_values(rig: StereoRig) -> dict[str, Any]:
 
 
 def write_rig(path: Path, rig: StereoRig, world: WorldConvention) -> None:
-    """Write a rig and its world; every number is read back as it was."""
+    """Write a rig and the world convention of its poses; numbers keep all digits.
+
+    Parameters
+    ----------
+    path : Path
+    rig : StereoRig
+    world : {"optical", "rep103"}
+    """
     # Python writes floats, and lists of them, the way TOML does.
     lines = [f'world = "{world}"', *(f"{key} = {value}" for key, value in rig_values(rig).items())]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def _check_keys(path: Path, values: dict[str, Any]) -> None:
-    known = (*REQUIRED, *OPTIONAL)
-    for key in values:
-        if key not in known:
-            close = get_close_matches(key, known, n=1)
-            hint = f"Did you mean {close[0]!r}?" if close else f"There are: {', '.join(known)}."
-            raise FileFormatError(path, "keys of a rig", f"the unknown key {key!r}", hint=hint)
-    missing = [key for key in REQUIRED if key not in values]
-    if missing:
-        raise FileFormatError(path, f"the keys {', '.join(REQUIRED)}", f"no {missing[0]!r}")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import re
+import math
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+import yaml
 
 from groundmap.arrays import Bytes
 from groundmap.errors import InputError
@@ -16,6 +16,7 @@ from groundmap.files.archive import write_atomically
 from groundmap.grid.grid import ConfidenceGrid
 from groundmap.grid.window import CellState
 from groundmap.io.dense import dense_window
+from groundmap.printable import is_plain
 
 # Contested cells are unknown to a planner, here as everywhere.
 GREYS = {
@@ -49,7 +50,8 @@ def write_ros_map(
     Raises
     ------
     InputError
-        An empty map, a 3-D one, bounds that are no box, or a box with too many cells.
+        An empty map, a 3-D one, bounds that are no box, a box with too many cells, or a file
+        name that is not UTF-8.
     OSError
         The folder does not exist or can't be written to.
     """
@@ -58,6 +60,8 @@ def write_ros_map(
     window = dense_window(grid, bounds)
     target = Path(path)
     image = target.with_suffix(".pgm")
+    if not is_plain(image.name):  # YAML could not name the image
+        raise InputError("path", "a file name in UTF-8", repr(image.name))
     pgm = _pgm(window.states())
     text = _yaml(image.name, window.resolution, window.origin.tolist())
     # The image first: a yaml file never names one that isn't there.
@@ -73,23 +77,19 @@ def _pgm(states: Bytes) -> bytes:
 
 
 def _yaml(image: str, resolution: float, origin: list[float]) -> str:
-    plain = re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]*", image)
-    x, y = map(_number, origin)
-    return "\n".join(
-        [
-            f"image: {image if plain else json.dumps(image, ensure_ascii=False)}",
-            "mode: trinary",
-            f"resolution: {_number(resolution)}",
-            f"origin: [{x}, {y}, 0]",
-            "negate: 0",
-            f"occupied_thresh: {OCCUPIED_THRESH}",
-            f"free_thresh: {FREE_THRESH}",
-            "",
-        ]
+    content = {
+        "image": image,
+        "mode": "trinary",
+        "resolution": float(resolution),
+        "origin": [*origin, 0],
+        "negate": 0,
+        "occupied_thresh": OCCUPIED_THRESH,
+        "free_thresh": FREE_THRESH,
+    }
+    return yaml.safe_dump(
+        content,
+        sort_keys=False,
+        allow_unicode=True,
+        default_flow_style=None,  # the origin on one line
+        width=math.inf,
     )
-
-
-def _number(value: float) -> str:
-    """Return every digit; YAML 1.1 takes ``1e-05`` for text, and ``1.0e-05`` for a number."""
-    text = repr(float(value))
-    return text if "." in text else text.replace("e", ".0e")

@@ -1,8 +1,8 @@
-"""Rigid transforms and the frames they join.
+"""Rigid transforms and coordinate frames.
 
-``T_map_camera`` takes camera coordinates to map coordinates: ``p_map = T_map_camera @ p_camera``,
-adjacent names cancel. ``map`` and ``base_link`` are x forward, y left, z up (REP-103); the camera's
-optical frame is x right, y down, z forward.
+``T_map_camera`` transforms camera coordinates to map coordinates, ``p_map = T_map_camera @
+p_camera``, so that adjacent names cancel in a product. ``map`` and ``base_link`` are x forward, y
+left, z up (REP-103); the optical frame of the camera is x right, y down, z forward.
 """
 
 from __future__ import annotations
@@ -11,30 +11,42 @@ from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 
 from groundmap.arrays import Floats, as_floats, check_finite
 from groundmap.errors import CameraError, InputError
 
 WorldConvention = Literal["optical", "rep103"]
 
-# Columns are the optical axes seen from a REP-103 frame: x right = -y, y down = -z, z forward = x.
+# Columns are the optical axes in a REP-103 frame: x right = -y, y down = -z, z forward = x.
 T_REP103_OPTICAL: Floats = np.array(
     [[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
 )
 ORTHONORMAL_TOLERANCE = 1e-4
+LENGTH_TOLERANCE = 1e-3  # of a quaternion: programs print as few as three decimals
 
 
 def check_transform(name: str, matrix: npt.ArrayLike) -> Floats:
-    """Return `matrix` as a rigid 4 x 4 transform, or say what keeps it from being one.
+    """Return a read-only copy of a matrix that is a rigid transform.
+
+    Parameters
+    ----------
+    name : str
+        Name of the matrix, for error messages.
+    matrix : array_like, shape (4, 4)
+
+    Returns
+    -------
+    ndarray, shape (4, 4)
 
     Raises
     ------
     CameraError
-        The rotation part is not orthonormal, mirrors, or the last row is not 0 0 0 1.
+        The rotation part is not orthonormal or is a reflection, or the last row is not 0 0 0 1.
     InputError
-        Another shape, or NaN or infinite entries.
+        The shape is not (4, 4), or an entry is NaN or infinite.
     """
-    transform = as_floats(name, matrix, (4, 4)).copy()  # what is checked is not changed later
+    transform = as_floats(name, matrix, (4, 4)).copy()  # the caller may change `matrix` later
     check_finite(name, transform)
     rotation = transform[:3, :3]
     with np.errstate(over="ignore", invalid="ignore"):
@@ -55,7 +67,7 @@ def check_transform(name: str, matrix: npt.ArrayLike) -> Floats:
 
 
 def invert(transform: Floats) -> Floats:
-    """Return the inverse of a rigid transform, without a linear solve."""
+    """Return the inverse of a rigid transform, shape (4, 4)."""
     rotation = transform[:3, :3]
     inverse = np.eye(4)
     inverse[:3, :3] = rotation.T
@@ -64,12 +76,22 @@ def invert(transform: Floats) -> Floats:
 
 
 def map_from_world(T_world: Floats, world: WorldConvention) -> Floats:
-    """Turn a pose given in the data's world into the ``map`` frame.
+    """Return poses in the ``map`` frame from poses in the world frame of a log.
+
+    Parameters
+    ----------
+    T_world : ndarray, shape (..., 4, 4) [m, world]
+    world : {"optical", "rep103"}
+        Axes of the world frame: x right, y down, z forward; or x forward, y left, z up.
+
+    Returns
+    -------
+    ndarray, shape (..., 4, 4) [m, map]
 
     Raises
     ------
     InputError
-        Another world than "optical" or "rep103".
+        `world` is neither "optical" nor "rep103".
 
     Examples
     --------
@@ -84,46 +106,47 @@ def map_from_world(T_world: Floats, world: WorldConvention) -> Floats:
 
 
 def from_quaternion(translation: Floats, quaternion: Floats) -> Floats:
-    """Return the transform of a translation [m] and a unit quaternion (x, y, z, w).
+    """Return the rigid transform of a translation and a quaternion.
+
+    Parameters
+    ----------
+    translation : ndarray, shape (3,) [m]
+    quaternion : ndarray, shape (4,)
+        In the order x, y, z, w.
+
+    Returns
+    -------
+    ndarray, shape (4, 4)
 
     Raises
     ------
     CameraError
-        The quaternion's length is not 1 within 1e-3.
+        The length of the quaternion differs from 1 by more than 1e-3.
+
+    Examples
+    --------
+    >>> from_quaternion(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))[:3, :3]
+    array([[1., 0., 0.],
+           [0., 1., 0.],
+           [0., 0., 1.]])
     """
     with np.errstate(over="ignore"):
         length = float(np.linalg.norm(quaternion))
-    if not abs(length - 1.0) <= 1e-3:
+    if not abs(length - 1.0) <= LENGTH_TOLERANCE:
         raise CameraError("quaternion", "length 1 (order x y z w)", f"length {length:.4g}")
-    x, y, z, w = quaternion / length
     transform = np.eye(4)
-    transform[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
+    transform[:3, :3] = Rotation.from_quat(quaternion).as_matrix()
     transform[:3, 3] = translation
     return transform
 
 
 def to_quaternion(transform: Floats) -> Floats:
-    """Return the unit quaternion (x, y, z, w), w >= 0, of a transform's rotation.
+    """Return the unit quaternion (x, y, z, w), w >= 0, of the rotation of a rigid transform.
 
     Examples
     --------
     >>> to_quaternion(np.eye(4))
     array([0., 0., 0., 1.])
     """
-    r = transform[:3, :3]
-    # The eigenvector of this symmetric matrix is stable for every rotation (Bar-Itzhack 2000).
-    k = np.array(
-        [
-            [r[0, 0] - r[1, 1] - r[2, 2], 0.0, 0.0, 0.0],
-            [r[0, 1] + r[1, 0], r[1, 1] - r[0, 0] - r[2, 2], 0.0, 0.0],
-            [r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], r[2, 2] - r[0, 0] - r[1, 1], 0.0],
-            [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], np.trace(r)],
-        ]
-    )
-    _, vectors = np.linalg.eigh(k, UPLO="L")
-    quaternion: Floats = vectors[:, -1]
-    return quaternion * (-1.0 if quaternion[3] < 0 else 1.0) + 0.0  # no negative zeros
+    quaternion: Floats = Rotation.from_matrix(transform[:3, :3]).as_quat(canonical=True)
+    return quaternion + 0.0  # no negative zeros

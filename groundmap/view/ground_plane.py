@@ -1,4 +1,4 @@
-"""The ground under one view: a plane, given or fitted."""
+"""The ground plane of one view."""
 
 from __future__ import annotations
 
@@ -10,28 +10,29 @@ from groundmap.arrays import Floats, as_floats, as_number, check_finite, is_numb
 from groundmap.errors import InputError
 from groundmap.view.stereo_rig import StereoRig
 
-TILT_FLOOR = 0.005  # [rad], a real road is no plane: more features don't make it one
+TILT_FLOOR = 0.005  # [rad], a road is not a perfect plane, however many features it has
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GroundPlane:
-    """The ground under one view, in its ``base_link`` frame, so that it moves with the pose.
+    """The ground under one view: a plane in the ``base_link`` frame, which moves with the pose.
 
     Parameters
     ----------
     normal : array_like, shape (3,) [base_link]
-        Unit vector, upwards.
+        Unit vector that points upwards.
     offset : float [m]
-        Height of the frame's origin above the plane.
+        Height of the origin of ``base_link`` above the plane.
     sigma_tilt : float, default 0.005 [rad]
         Standard deviation of the tilt.
     support : int, default 0
-        Ground features it was fitted to; 0: given by hand, or carried over.
+        Number of ground features that the plane was fitted to; 0 for a plane that was given, or
+        taken over from an earlier view.
 
     Raises
     ------
     InputError
-        The normal is not of length 1, or a number is not finite.
+        The normal does not have length 1, a number is not finite, or `sigma_tilt` is negative.
 
     Examples
     --------
@@ -64,7 +65,19 @@ class GroundPlane:
 
     @classmethod
     def below_camera(cls, rig: StereoRig, camera_height: float) -> GroundPlane:
-        """Return the level ground that lies `camera_height` [m] below the left camera."""
+        """Return level ground at a given depth below the left camera.
+
+        Parameters
+        ----------
+        rig : StereoRig
+        camera_height : float [m]
+            Height of the left camera above the ground.
+
+        Raises
+        ------
+        InputError
+            `camera_height` is not above 0.
+        """
         expected = "a number above 0 [m]"
         camera_height = as_number("camera_height", camera_height, expected, above=0.0)
         offset = camera_height - float(rig.up @ rig.T_base_camera[:3, 3])

@@ -1,4 +1,4 @@
-"""Jumps of the poses: steps from view to view that nothing drove."""
+"""Jumps in a sequence of poses: steps between views that are too long to be motion."""
 
 from __future__ import annotations
 
@@ -10,38 +10,43 @@ import numpy.typing as npt
 
 from groundmap.arrays import Bools, Floats, as_floats, as_numbers, as_positions
 
-FAR_LONGER = 10.0  # a jump is longer than so many typical steps
-LEAST_JUMP = 3.0  # [m], a shorter step is none: keyframes are taken that far apart
-STANDSTILL = 0.01  # [m], shorter steps are pauses, and say nothing of what is typical
-MOST_TYPICAL = 10.0  # [m], and [m/s]: of few views, the typical step is the jump's own
-AROUND = 5  # steps before and after: a robot does not speed up for one step alone
+FAR_LONGER = 10.0  # typical steps; a jump is longer
+LEAST_JUMP = 3.0  # [m]; keyframes are up to this far apart, so shorter steps are not jumps
+STANDSTILL = 0.01  # [m]; shorter steps are pauses, and left out of the typical step
+MOST_TYPICAL = 10.0  # [m] and [m/s]; in a log of few views, a jump is itself the median step
+AROUND = 5  # steps before and after; a robot does not speed up for a single step
 
 
 class Jump(NamedTuple):
-    """A step from one view to the next that nothing drove."""
+    """A step between consecutive views that is too long to be motion."""
 
-    view: int  #: number of the view that it leads to, from 0
-    step: float  #: its length [m]
-    typical_step: float  #: what is usual around it [m]
+    view: int  #: index of the view at the end of the step
+    step: float  #: length of the step [m]
+    typical_step: float  #: typical length of the steps around it [m]
 
 
 def pose_jumps(positions: npt.ArrayLike, times: npt.ArrayLike | None = None) -> list[Jump]:
-    """Return the jumps in a sequence of poses; a view that lies off alone counts once.
+    """Return the jumps in a sequence of poses.
 
-    A step is a jump if it is longer than 3 m and than ten typical steps. What is typical is the
-    median of all steps but pauses, or of the ten steps around it if that is more. Where times are
-    known, it must be as much faster than is typical, too: views may be missing in between.
+    A step is a jump if it is longer than 3 m and longer than ten typical steps. The typical step
+    is the median of all steps without pauses, or the median of the ten surrounding steps if that
+    is larger. With `times`, the speed must exceed ten typical speeds as well, because views may be
+    missing in between. A single displaced view counts as one jump, not as two.
 
     Parameters
     ----------
     positions : array_like, shape (n, 2) or (n, 3) [m, map]
-        Of the views, in their order.
+        Positions of consecutive views.
     times : array_like, shape (n,), optional [s]
+
+    Returns
+    -------
+    list of Jump
 
     Raises
     ------
     InputError
-        Positions or times that are not finite numbers, or not as many times as positions.
+        A position is not finite, a time is not a number, or the lengths differ.
 
     Examples
     --------
@@ -54,13 +59,13 @@ def pose_jumps(positions: npt.ArrayLike, times: npt.ArrayLike | None = None) -> 
     places = as_positions("positions", given, 3 if given.shape[1:] == (3,) else 2)
     if len(places) < 2:
         return []
-    with np.errstate(over="ignore"):  # farther than numbers reach is far
+    with np.errstate(over="ignore"):  # an infinite step is a jump
         steps = np.hypot.reduce(np.diff(places, axis=0), axis=1)
     typical = _typical(steps, steps)
     far = _far(steps, typical, LEAST_JUMP)
     if times is not None:
         spans = np.diff(as_floats("times", times, (len(places),)))
-        # Views at one time, or in another order than time's, leave no time to move.
+        # Between views with equal or decreasing timestamps there is no time to move.
         with np.errstate(over="ignore"):
             speeds = np.where(spans > 0, steps / np.where(spans > 0, spans, 1.0), np.inf)
         far &= _far(speeds, _typical(speeds, steps), 0.0)
@@ -79,7 +84,7 @@ def _far(values: Floats, typical: Floats, least: float) -> Bools:
 
 
 def _typical(values: Floats, steps: Floats) -> Floats:
-    """Return, for each step, the median of all but pauses, or of those around it if it is more."""
+    """Return the larger of two medians for each step: all without pauses, and those around it."""
     moving = values[steps > STANDSTILL]
     with np.errstate(over="ignore"):
         overall = float(np.median(moving)) if len(moving) else 0.0

@@ -1,4 +1,4 @@
-"""The stereo rig: from matched pixels to 3-D points with covariance."""
+"""The stereo rig: 3-D points with covariance from matched pixels."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from groundmap.errors import CameraError
 from groundmap.printable import format_value
 from groundmap.view.frames import check_transform
 
-MOST = 1e9  # of any number of a rig: far beyond all rigs, and its square is a number
+MOST = 1e9  # bound of all numbers of a rig; their squares and products stay finite
 
 
 class Triangulated(NamedTuple):
-    """What `StereoRig.triangulate` returns."""
+    """Result of `StereoRig.triangulate`: n of the m given rows have a 3-D position."""
 
-    xyz: Floats  #: shape (n, ..., 3) [m, camera], the kept rows
-    covariance: Floats  #: shape (n, ..., 3, 3) [m², camera]
-    kept: Bools  #: shape (rows given,), which rows they are
-    dropped: Counter[str]  #: how many rows were dropped, by reason
+    xyz: Floats  #: shape (n, 3) or (n, 2, 3) [m, camera]
+    covariance: Floats  #: shape (n, 3, 3) or (n, 2, 3, 3) [m², camera]
+    kept: Bools  #: shape (m,), true for these n rows
+    dropped: Counter[str]  #: number of dropped rows by reason
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StereoRig:
-    """A rectified stereo pair.
+    """A rectified stereo pair and its mounting on the robot.
 
     Parameters
     ----------
@@ -37,17 +37,18 @@ class StereoRig:
     cx, cy : float
         Principal point of the left image [px].
     baseline : float
-        Distance between the cameras [m].
+        Distance between the two cameras [m].
     pixel_noise_px : float, default 0.5
         Standard deviation of a matched pixel coordinate [px].
-    T_base_camera : array_like, shape (4, 4)
-        Left camera in ``base_link``. The identity, as assumed unless told, says that the poses
-        are the camera's own, with optical axes (x right, y down, z forward).
+    T_base_camera : array_like, shape (4, 4), default the identity
+        Pose of the left camera in ``base_link``. With the identity, the poses of views are those
+        of the camera itself, with optical axes (x right, y down, z forward).
 
     Raises
     ------
     CameraError
-        A focal length, the baseline or the noise is not above zero; `T_base_camera` is not rigid.
+        A focal length, the baseline or the noise is not above 0, a number is not finite or is
+        above 1e9, or `T_base_camera` is not a rigid transform.
 
     Examples
     --------
@@ -86,39 +87,49 @@ class StereoRig:
 
     @property
     def is_mounted(self) -> bool:
-        """Whether the poses are a base's that carries the camera, not the camera's own."""
+        """Whether poses are those of a base that carries the camera, not of the camera itself."""
         return not np.array_equal(self.T_base_camera, np.eye(4))
 
     @property
     def up(self) -> Floats:
-        """Direction of up, shape (3,) [base_link].
+        """Unit vector that points up, shape (3,) [base_link].
 
-        z where the camera is mounted on a base; -y where the poses are the camera's own.
+        It is z for a mounted camera, and -y where the poses are those of the camera itself.
         """
         return np.array([0.0, 0.0, 1.0]) if self.is_mounted else np.array([0.0, -1.0, 0.0])
 
     @property
     def forward(self) -> Floats:
-        """Direction of forward, shape (3,) [base_link]: x of a base, the camera's own axis else."""
+        """Unit vector that points forward, shape (3,) [base_link].
+
+        It is x for a mounted camera, and z where the poses are those of the camera itself.
+        """
         return np.array([1.0, 0.0, 0.0]) if self.is_mounted else np.array([0.0, 0.0, 1.0])
 
     def triangulate(self, pixels: npt.ArrayLike) -> Triangulated:
-        """Return the 3-D points of matched pixels, dropping those that have none.
+        """Return the 3-D positions of matched pixels; rows without one are dropped and counted.
 
         Parameters
         ----------
-        pixels : array_like, shape (n, 3) or (n, 2, 3) [px]
-            (uL, uR, v) of points, or of both ends of segments. A segment with one bad end goes.
+        pixels : array_like, shape (m, 3) or (m, 2, 3) [px]
+            (uL, uR, v) of points, or of both ends of segments. A segment is dropped if one of its
+            ends is.
 
         Returns
         -------
         Triangulated
-            Reasons for drops: ``not_finite``, ``no_disparity`` (uL - uR not above 0).
+            Reasons for dropped rows are ``not_finite`` and ``no_disparity`` (uL - uR is not above
+            0).
+
+        Raises
+        ------
+        InputError
+            `pixels` are not numbers of one of these shapes.
 
         Notes
         -----
-        Depth is fx * baseline / disparity; the covariance is the Jacobian's, from independent
-        noise of uL, uR and v (Matthies and Shafer 1987).
+        The depth is fx * baseline / disparity. The covariance propagates independent noise of uL,
+        uR and v through the Jacobian (Matthies and Shafer 1987).
         """
         array = as_numbers("pixels", pixels, "numbers of shape (n, 3) or (n, 2, 3)")
         ends = array.ndim == 3
@@ -135,7 +146,7 @@ class StereoRig:
                 "no_disparity": int((finite & ~visible).sum()),
             }
         )
-        # A view drops what is not finite.
+        # Positions that overflow are dropped by the view.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             xyz = self._points(rows[kept], disparity_px[kept])
             covariance = self._covariance(xyz, disparity_px[kept])
@@ -158,6 +169,6 @@ class StereoRig:
         jacobian[..., :, 1] = -by_disparity
         jacobian[..., 0, 0] += scale
         jacobian[..., 1, 2] = scale * (self.fx / self.fy)
-        variance = np.float64(self.pixel_noise_px) ** 2  # infinite where Python's would raise
+        variance = self.pixel_noise_px**2
         covariance: Floats = variance * (jacobian @ np.swapaxes(jacobian, -1, -2))
         return covariance

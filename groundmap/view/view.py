@@ -1,4 +1,4 @@
-"""Views: what one stereo observation gives, in the form that everything after it reads."""
+"""Views: one stereo observation each, the input of everything after it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from groundmap.view.frames import check_transform
 from groundmap.view.ground_plane import GroundPlane
 from groundmap.view.stereo_rig import StereoRig
 
-COVARIANCE_TOLERANCE = 1e-5  # of the largest entry: what text with five digits is off
+COVARIANCE_TOLERANCE = 1e-5  # relative to the largest entry; the rounding of five digits
 FARTHEST = 1e8  # [m] from the camera
 
 
@@ -23,19 +23,26 @@ FARTHEST = 1e8  # [m] from the camera
 class Features:
     """Point or segment features of one view, in the camera frame.
 
+    Construct them with `Features.points` or `Features.segments`, which check their arguments.
+
     Parameters
     ----------
-    xyz : array_like, shape (n, 3) or (n, 2, 3) [m, camera]
+    xyz : ndarray, shape (n, 3) or (n, 2, 3) [m, camera]
         Points, or both ends of segments.
-    covariance : array_like, shape (n, 3, 3) or (n, 2, 3, 3) [m², camera]
-    ids : array_like, shape (n,), optional
-        Landmark ids; -1 where a feature has none.
+    covariance : ndarray, shape (n, 3, 3) or (n, 2, 3, 3) [m², camera]
+    ids : ndarray, shape (n,)
+        Landmark ids; -1 for features without one.
 
     Raises
     ------
     InputError
-        Shapes that do not belong together; from `points` and `segments`, a covariance that is not
-        symmetric and positive semi-definite, too.
+        The arrays differ in length.
+
+    Examples
+    --------
+    >>> landmarks = Features.points([(0.5, 1.5, 8.0)], [0.01 * np.eye(3)], ids=[7])
+    >>> len(landmarks), landmarks.ids
+    (1, array([7]))
     """
 
     xyz: Floats
@@ -57,14 +64,40 @@ class Features:
     def points(
         cls, xyz: npt.ArrayLike, covariance: npt.ArrayLike, ids: npt.ArrayLike | None = None
     ) -> Features:
-        """Return point features from XYZ and covariance."""
+        """Return point features from their positions and covariances.
+
+        Parameters
+        ----------
+        xyz : array_like, shape (n, 3) [m, camera]
+        covariance : array_like, shape (n, 3, 3) [m², camera]
+        ids : array_like of int, shape (n,), optional
+            Landmark ids; default: -1, no id.
+
+        Raises
+        ------
+        InputError
+            A shape is wrong, or a covariance is not symmetric and positive semi-definite.
+        """
         return cls._check(xyz, covariance, ids, ())
 
     @classmethod
     def segments(
         cls, xyz: npt.ArrayLike, covariance: npt.ArrayLike, ids: npt.ArrayLike | None = None
     ) -> Features:
-        """Return segment features from the XYZ and covariance of both ends."""
+        """Return segment features from the positions and covariances of both ends.
+
+        Parameters
+        ----------
+        xyz : array_like, shape (n, 2, 3) [m, camera]
+        covariance : array_like, shape (n, 2, 3, 3) [m², camera]
+        ids : array_like of int, shape (n,), optional
+            Landmark ids; default: -1, no id.
+
+        Raises
+        ------
+        InputError
+            A shape is wrong, or a covariance is not symmetric and positive semi-definite.
+        """
         return cls._check(xyz, covariance, ids, (2,))
 
     @classmethod
@@ -76,42 +109,54 @@ class Features:
         ends: tuple[int, ...],
     ) -> Features:
         positions = as_floats("xyz", xyz, (None, *ends, 3))
-        spread = as_floats("covariance", covariance, (None, *ends, 3, 3))
-        wrong = wrong_covariance(spread)
+        covariances = as_floats("covariance", covariance, (None, *ends, 3, 3))
+        wrong = wrong_covariance(covariances)
         if wrong is not None:
             where = f"index {wrong.row}"
             raise InputError("covariance", wrong.expected, wrong.got, where=where)
         if ids is None:
-            return cls(positions, spread, np.full(len(positions), -1, dtype=np.int64))
-        return cls(positions, spread, _as_ids("ids", ids))
+            return cls(positions, covariances, np.full(len(positions), -1, dtype=np.int64))
+        return cls(positions, covariances, _as_ids("ids", ids))
 
     def select(self, keep: npt.NDArray[np.generic]) -> Features:
-        """Return the features that a mask or an index array picks."""
+        """Return the features that a mask or an array of indices selects."""
         return Features(self.xyz[keep], self.covariance[keep], self.ids[keep])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class View:
-    """One stereo observation.
+    """One stereo observation: a pose, and the features seen from it.
+
+    Features that are not finite, lie behind the camera or are more than 1e8 m away are dropped and
+    counted in `dropped`.
 
     Parameters
     ----------
-    T_map_base : array_like, shape (4, 4)
+    T_map_base : array_like, shape (4, 4) [m, map]
         Pose of ``base_link`` in the map.
     rig : StereoRig
-    points, segments : Features
-        Features in the camera frame. Rows that are not finite, lie behind the camera or beyond
-        1e8 m are dropped and counted; `from_pixels` counts those without disparity, too.
+    points, segments : Features, default none
+        Features in the camera frame.
     timestamp : float, optional [s]
     plane : GroundPlane, optional
-        The ground under this view; `groundmap.fit_ground` puts it there.
-    dropped : Counter
-        Features given but not kept, by reason.
+        The ground under this view, as `groundmap.fit_ground` determines it.
+    dropped : Counter, default empty
+        Number of features that were dropped before, by reason.
 
     Raises
     ------
     CameraError
         The pose is not a rigid transform.
+    InputError
+        The timestamp is not a number.
+
+    Examples
+    --------
+    >>> rig = StereoRig(fx=700.0, fy=700.0, cx=320.0, cy=240.0, baseline=0.5)
+    >>> landmarks = Features.points([(0.5, 1.5, 8.0), (0.0, 0.0, -1.0)], [0.01 * np.eye(3)] * 2)
+    >>> view = View(T_map_base=np.eye(4), rig=rig, points=landmarks)
+    >>> len(view.points), dict(view.dropped)
+    (1, {'behind_camera': 1})
     """
 
     T_map_base: Floats
@@ -154,7 +199,29 @@ class View:
         segment_ids: npt.ArrayLike | None = None,
         timestamp: float | None = None,
     ) -> View:
-        """Return the view of matched pixels: (uL, uR, v), or both ends of segments [px].
+        """Return a view from matched pixels.
+
+        Features without a positive disparity are dropped and counted as well.
+
+        Parameters
+        ----------
+        T_map_base : array_like, shape (4, 4) [m, map]
+        rig : StereoRig
+        points_px : array_like, shape (n, 3), optional [px]
+            (uL, uR, v): columns in the left and right image, and the common row.
+        segments_px : array_like, shape (k, 2, 3), optional [px]
+            (uL, uR, v) of both ends.
+        point_ids : array_like of int, shape (n,), optional
+            Landmark ids; default: -1, no id.
+        segment_ids : array_like of int, shape (k,), optional
+        timestamp : float, optional [s]
+
+        Raises
+        ------
+        CameraError
+            The pose is not a rigid transform.
+        InputError
+            An array has a wrong shape, or the timestamp is not a number.
 
         Examples
         --------
@@ -182,16 +249,16 @@ class View:
 
     @property
     def T_map_camera(self) -> Floats:
-        """Pose of the left camera in the map, shape (4, 4)."""
+        """Pose of the left camera in the map, shape (4, 4) [m, map]."""
         return self.T_map_base @ self.rig.T_base_camera
 
     def with_plane(self, plane: GroundPlane) -> View:
-        """Return this view standing on `plane`, given in its ``base_link`` frame."""
+        """Return a copy of this view with another ground plane."""
         return replace(self, plane=plane)
 
 
 class WrongCovariance(NamedTuple):
-    """The first covariance that none can be."""
+    """The first matrix of an array that is not a covariance."""
 
     row: int  #: index of the feature
     expected: str
@@ -201,8 +268,8 @@ class WrongCovariance(NamedTuple):
 def wrong_covariance(covariance: Floats) -> WrongCovariance | None:
     """Return the first feature whose covariance is not symmetric or has a negative eigenvalue.
 
-    Rounding is allowed for, to `COVARIANCE_TOLERANCE` of the largest entry; what is not finite is
-    passed over, since views drop and count it.
+    Rounding errors of up to 1e-5 of the largest entry are accepted. Matrices that are not finite
+    are skipped, since views drop and count their features.
 
     Parameters
     ----------
@@ -235,9 +302,16 @@ def wrong_covariance(covariance: Floats) -> WrongCovariance | None:
 
 
 def sigma_along(direction: Floats, covariance: Floats) -> Floats:
-    """Return the standard deviation along a unit vector, shape (...), of (..., 3, 3) [m]."""
+    """Return standard deviations along a direction, shape (...) [m].
+
+    Parameters
+    ----------
+    direction : ndarray, shape (3,)
+        Unit vector, in the frame of the covariances.
+    covariance : ndarray, shape (..., 3, 3) [m²]
+    """
     variance = np.einsum("i,...ij,j->...", direction, covariance, direction)
-    # What was rounded may be a little below 0 in a direction that is known exactly.
+    # Rounding can make a variance of 0 negative.
     sigma: Floats = np.sqrt(np.maximum(variance, 0.0))
     return sigma
 
@@ -248,8 +322,8 @@ def _select_rows(ids: npt.ArrayLike | None, kept: npt.NDArray[np.bool_], name: s
     array = _as_ids(name, ids)
     if array.shape != kept.shape:
         raise InputError(name, f"shape {kept.shape}", f"shape {array.shape}")
-    picked: Ints = array[kept]
-    return picked
+    selected: Ints = array[kept]
+    return selected
 
 
 def _as_ids(name: str, ids: npt.ArrayLike) -> Ints:
@@ -267,10 +341,10 @@ def _as_ids(name: str, ids: npt.ArrayLike) -> Ints:
 
 
 def _as_time(timestamp: object) -> float:
-    """Return a time stamp as a float: finite or not, as `groundmap.write_views` tells."""
+    """Return a timestamp as a float; `groundmap.write_views` refuses one that is not finite."""
     if isinstance(timestamp, (float, np.floating)):
         return float(timestamp)
-    return as_number("timestamp", timestamp, "a number [s], or none")
+    return as_number("timestamp", timestamp, "a number [s] or None")
 
 
 def _no_features(ends: tuple[int, ...]) -> Features:

@@ -179,7 +179,7 @@ def test_nothing_is_written_over_what_the_map_is_made_of(tmp_path: Path) -> None
     for options in (("--plot", image), ("--out", tmp_path / "hall.yaml")):
         ran = plan(tmp_path / "hall.yaml", *options, start="0,0", goal="4,1", footprint="0.3")
         assert ran.code == 2
-        assert "expected another file than the one that is read" in ran.json["reason"]
+        assert "expected a file other than the input" in ran.json["reason"]
     assert run("plot", tmp_path / "hall.yaml", "--out", image).code == 2
     assert image.read_bytes() == before
 

@@ -1,4 +1,4 @@
-"""Recorded drives, read in place: the road that the camera drove on is free."""
+"""Recorded drives: the road that the camera drove on is free."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ DATA = Path(__file__).parents[3] / "shared" / "data"
 
 
 class Drive(NamedTuple):
-    """A recorded drive, and how much of the road it drove on has to be free."""
+    """A recorded drive, and the least share of free cells on its road."""
 
     name: str
     views: int
@@ -44,7 +44,7 @@ def map_of(drive: Drive, *, causal: bool = False) -> GroundMapper:
 def cells_crossed(path: Floats, resolution: float) -> Ints:
     """Return the cells ``[row, col]`` that a line through positions (x, y) crosses, each once.
 
-    Sampled at 1/50 of a cell: only corners cut by less than that may be missed.
+    Samples are 1/50 of a cell apart, so corners that are cut by less may be missed.
     """
     lengths = np.hypot(*np.diff(path, axis=0).T)
     pieces = [
@@ -62,7 +62,7 @@ def test_the_road_that_was_driven_on_is_free(drive: Drive, causal: bool) -> None
     poses = [view.T_map_camera[:2, 3] for view in read_views(source_of(drive))]
     crossed = cells_crossed(np.array(poses), mapper.grid.resolution)
     window = mapper.grid.window()
-    # Of another origin: the window begins at the first touched tile.
+    # The window begins at the first tile, not at the origin.
     rows, cols = window.world_to_cell((crossed[:, ::-1] + 0.5) * mapper.grid.resolution).T
     states = window.states()[rows, cols]
     assert (states == CellState.NONFREE).sum() == 0
@@ -86,7 +86,7 @@ def test_the_road_lies_as_far_below_the_camera_as_was_measured(drive: Drive) -> 
         if view.plane is not None
     ]
     assert len(heights) == drive.views
-    # 1.60 m and 1.62 m by hand; on single views the road is no plane.
+    # Measured by hand: 1.60 m and 1.62 m. In single views the road is not a plane.
     assert np.median(heights) == pytest.approx(1.61, abs=0.06)
 
 
@@ -115,7 +115,7 @@ def test_every_planner_drives_the_recorded_street(street: ConfidenceGrid, planne
     assert route.headings[-1] == last[2]
 
 
-def test_a_car_parks_where_its_disc_has_no_place(street: ConfidenceGrid) -> None:
+def test_a_car_parks_where_its_enclosing_disc_does_not_fit(street: ConfidenceGrid) -> None:
     car = [(-0.5, -0.6), (2.0, -0.6), (2.0, 0.6), (-0.5, 0.6)]
     first, last = street.trajectory[[0, -1]]
     problem = PlanningProblem(street, start=first, goal=last, footprint=car)
@@ -124,7 +124,7 @@ def test_a_car_parks_where_its_disc_has_no_place(street: ConfidenceGrid) -> None
     assert plan(problem, "hybrid_astar", turning_radius=4.0).audit == "clean"
 
 
-def test_a_route_is_planned_anew_while_the_street_is_mapped() -> None:
+def test_incremental_planning_agrees_with_planning_anew_during_mapping() -> None:
     mapper, views = GroundMapper(), list(fit_ground(read_views(source_of(DRIVES[0]))))
     for view in views[:20]:
         mapper.integrate(view)

@@ -1,4 +1,4 @@
-"""Held-out evaluation: the judge's figures on maps that are known, and on real logs."""
+"""Held-out evaluation: its figures for known maps and for recorded logs."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def held_out(
 
 
 def street() -> Floats:
-    """8 m x 4 m of free cells, a wall along the top, the last metre never seen."""
+    """8 m x 4 m of free cells, with a wall along the top and a last metre that is unknown."""
     z = np.full((16, 32), FREE)
     z[14:] = NONFREE
     z[:, 28:] = UNSEEN
@@ -44,7 +44,7 @@ def street() -> Floats:
 DRIVE = np.array([(0.1, 1.1), (6.9, 1.1)])
 
 
-def test_obstacles_are_judged_by_their_cell_and_by_what_is_near() -> None:
+def test_obstacles_are_judged_by_their_cell_and_the_cells_around_it() -> None:
     obstacles = np.array([(2.1, 3.6), (2.1, 3.3), (2.1, 3.1), (7.5, 1.0), (99.0, 1.0)])
     figures = judge(grid_of(street()), held_out(obstacles=obstacles), DRIVE).figures()
     # The wall's squares begin at y = 3.5: 3.3 is within 0.3 m of them, 3.1 is not.
@@ -80,7 +80,7 @@ def test_the_length_of_a_sight_line_in_unknown_space_is_not_free() -> None:
     assert figures.sightline_crosses_nonfree == 0.0
 
 
-def test_the_drive_before_the_first_sight_is_reported_apart() -> None:
+def test_the_trajectory_before_its_first_known_cell_is_reported_separately() -> None:
     z = street()
     z[:, :8] = UNSEEN
     z[4, 12] = NONFREE
@@ -90,29 +90,29 @@ def test_the_drive_before_the_first_sight_is_reported_apart() -> None:
     assert figures.trajectory_free == pytest.approx(19 / 20)
 
 
-def test_nothing_to_judge_gives_zeros_and_no_warning() -> None:
+def test_without_features_all_shares_are_zero_without_a_warning() -> None:
     figures = judge(grid_of(street()), held_out(), DRIVE).figures()
     assert figures.obstacles == figures.grounds == 0
     assert figures.obstacle_near_nonfree == figures.sightline_free == 0.0
 
 
 @pytest.mark.parametrize("name", ["views", "ids", "thin"])
-def test_a_protocol_judges_everything_once_and_maps_nothing_that_it_judges(name: str) -> None:
+def test_each_feature_is_held_out_once_and_never_mapped_in_the_same_fold(name: str) -> None:
     split, _ = PROTOCOLS[name]
     ids = np.arange(1000)
     points = Features.points(np.ones((1000, 3)), np.tile(np.eye(3), (1000, 1, 1)), ids)
     views = [replace(view_with(points), timestamp=float(number)) for number in range(10)]
-    judged: list[tuple[int, int]] = []
+    pairs: list[tuple[int, int]] = []
     for fold in range(FOLDS):
         for number, view in enumerate(views):
-            mapped, judged_view = split(fold, number, view)
-            kept = set() if mapped is None else set(mapped.points.ids.tolist())
-            held = set() if judged_view is None else set(judged_view.points.ids.tolist())
-            assert not kept & held
+            mapped_part, held_part = split(fold, number, view)
+            mapped = set() if mapped_part is None else set(mapped_part.points.ids.tolist())
+            held = set() if held_part is None else set(held_part.points.ids.tolist())
+            assert not mapped & held
             if name == "thin":
-                assert len(kept) < 300
-            judged += [(number, landmark) for landmark in held]
-    assert sorted(judged) == [
+                assert len(mapped) < 300
+            pairs += [(number, landmark) for landmark in held]
+    assert sorted(pairs) == [
         (number, landmark) for number in range(10) for landmark in range(1000)
     ]
 
@@ -131,8 +131,8 @@ def test_small_cells_around_many_points_do_not_fill_the_memory() -> None:
         near.append(near_nonfree(window, states, points))
 
     assert peak_memory(work) < 100e6  # the boxes of all points take 1 GB
-    apart = np.maximum(np.abs(points - 1.0025) - 0.0025, 0.0)
-    np.testing.assert_array_equal(near[0], np.hypot(*apart.T) <= 0.3)
+    offset = np.maximum(np.abs(points - 1.0025) - 0.0025, 0.0)
+    np.testing.assert_array_equal(near[0], np.hypot(*offset.T) <= 0.3)
 
 
 def test_a_short_log_is_refused() -> None:
@@ -140,12 +140,12 @@ def test_a_short_log_is_refused() -> None:
         evaluate(few_views(2))
 
 
-def test_landmarks_without_ids_are_refused() -> None:
+def test_points_without_ids_are_refused() -> None:
     with pytest.raises(InputError, match=r"landmark id for every point, .* at view 0"):
         evaluate(few_views(6))
 
 
-def test_maps_and_judge_take_the_cameras_height_where_no_plane_can_be_fitted() -> None:
+def test_a_camera_height_replaces_fitted_planes_in_maps_and_held_out_views() -> None:
     bare = [
         replace(
             view,
@@ -160,7 +160,7 @@ def test_maps_and_judge_take_the_cameras_height_where_no_plane_can_be_fitted() -
     figures = evaluate(bare, camera_height=1.0)["views"].figures
     assert (figures.grounds, figures.obstacles) == (40, 0)
     assert figures.ground_free > 0.5
-    # With a camera that is taken to be higher, the same features are obstacles.
+    # For a higher camera, the same features are obstacles.
     assert evaluate(bare, camera_height=2.0)["views"].figures.obstacles == 40
 
 
@@ -176,7 +176,7 @@ def kitti00() -> dict[str, Verdict]:
     return evaluate(read_views(DATA / "kitti00_vo"))
 
 
-# Where an experiment with other rules went wrong, one of these was the first to tell.
+# Figures that were the first to show a regression in experiments with other rules.
 BOUNDS: dict[str, dict[str, tuple[float, float]]] = {
     "views": {
         "obstacle_near_nonfree": (0.96, 1.0),
@@ -206,14 +206,14 @@ BOUNDS: dict[str, dict[str, tuple[float, float]]] = {
     ("protocol", "figure"),
     [(protocol, figure) for protocol, figures in BOUNDS.items() for figure in figures],
 )
-def test_a_real_drive_is_mapped_as_features_held_out_say(
+def test_figures_of_a_recorded_drive_are_within_bounds(
     kitti00: dict[str, Verdict], protocol: str, figure: str
 ) -> None:
     low, high = BOUNDS[protocol][figure]
     assert low <= asdict(kitti00[protocol].figures)[figure] <= high
 
 
-def test_stamping_discs_leaves_far_more_of_the_sight_lines_unknown(
+def test_stamping_leaves_more_of_the_sight_lines_unknown_than_mapping(
     kitti00: dict[str, Verdict],
 ) -> None:
     stamped, mapped = kitti00["stamping"].figures, kitti00["views"].figures

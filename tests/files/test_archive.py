@@ -1,4 +1,4 @@
-"""Archives: lossless, all or nothing, and refusing all that they did not write."""
+"""Archives: lossless, written completely or not at all, and other files are refused."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def test_an_interrupted_write_leaves_the_older_file_and_nothing_else(
     assert path.read_bytes() == b"the older map"
 
 
-def test_the_older_file_stands_until_the_new_one_is_whole(tmp_path: Path) -> None:
+def test_the_older_file_stays_until_the_new_one_is_complete(tmp_path: Path) -> None:
     path = tmp_path / "map"
     path.write_bytes(b"old")
     seen = []
@@ -128,7 +128,7 @@ def test_a_written_file_is_as_readable_as_any_other(tmp_path: Path) -> None:
     assert ours.stat().st_mode == plain.stat().st_mode
 
 
-def test_a_folder_in_the_way_stays_and_nothing_is_left(tmp_path: Path) -> None:
+def test_a_folder_is_not_replaced_and_nothing_is_left(tmp_path: Path) -> None:
     folder = tmp_path / "map"
     folder.mkdir()
     with pytest.raises(IsADirectoryError, match="map"):
@@ -182,7 +182,7 @@ NOT_ARCHIVES: dict[str, Callable[[], bytes]] = {
 
 
 @pytest.mark.parametrize("what", NOT_ARCHIVES)
-def test_a_file_that_is_no_archive_is_refused(tmp_path: Path, what: str) -> None:
+def test_a_file_that_is_not_an_archive_is_refused(tmp_path: Path, what: str) -> None:
     path = tmp_path / "file"
     path.write_bytes(NOT_ARCHIVES[what]())
     with pytest.raises(
@@ -208,13 +208,13 @@ def test_a_newer_version_is_refused_with_what_to_do(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("version", ["1", None, [1], {}])
-def test_a_version_that_is_no_number_is_refused(tmp_path: Path, version: object) -> None:
+def test_a_version_that_is_not_a_number_is_refused(tmp_path: Path, version: object) -> None:
     write_archive(tmp_path / "a", {**HEADER, "version": version}, {})
     with pytest.raises(FileFormatError, match="version"):
         read_archive(tmp_path / "a", FORMAT, 1)
 
 
-def test_a_missing_file_and_a_folder_are_refused_by_what_they_are(tmp_path: Path) -> None:
+def test_a_missing_file_and_a_folder_are_distinguished(tmp_path: Path) -> None:
     with pytest.raises(FileFormatError, match="no file of that name"):
         read_archive(tmp_path / "nowhere", FORMAT, 1)
     with pytest.raises(FileFormatError, match="a folder"):
@@ -259,15 +259,13 @@ NOWHERE = [
     ("gone/x.npz", "a file in a folder that exists, got no folder"),
     ("folder", "a file name, got a folder"),
     ("x" * 300, "a file that can be written, got file name too long"),
-    ("a\0b", "a file that can be written, got no such name"),
+    ("a\0b", "a file that can be written, got an invalid file name"),
     ("circle", "a file that can be written, got"),
 ]
 
 
 @pytest.mark.parametrize(("name", "got"), NOWHERE, ids=["gone", "folder", "long", "NUL", "circle"])
-def test_what_cannot_be_written_is_refused_before_the_work(
-    tmp_path: Path, name: str, got: str
-) -> None:
+def test_a_path_that_cannot_be_written_is_refused(tmp_path: Path, name: str, got: str) -> None:
     (tmp_path / "folder").mkdir()
     (tmp_path / "circle").symlink_to(tmp_path / "circle" / "x")
     before = sorted(tmp_path.iterdir())
@@ -277,12 +275,12 @@ def test_what_cannot_be_written_is_refused_before_the_work(
 
 
 @pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="a folder that root can't write to")
-def test_a_folder_that_cannot_be_written_to_is_refused_before_the_work() -> None:
+def test_a_folder_that_cannot_be_written_to_is_refused() -> None:
     with pytest.raises(FileFormatError, match="expected a file that can be written, got"):
         check_writable("/proc/map.npz")
 
 
-def test_a_name_as_long_as_the_system_takes_is_written(tmp_path: Path) -> None:
+def test_a_name_of_the_maximum_length_is_written(tmp_path: Path) -> None:
     path = tmp_path / ("x" * 255)
     check_writable(path)
     write_archive(path, HEADER, {})

@@ -1,4 +1,4 @@
-"""Archives of arrays that others wrote: the arrays, or one error and no memory taken."""
+"""Archives of arrays of any origin: the arrays, or one error without memory allocated."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from hypothesis import strategies as st
 from groundmap.errors import FileFormatError
 from groundmap.files.array_files import read_arrays
 
-SAID = "{'descr': %s, 'fortran_order': False, 'shape': %s, }"
+HEADER = "{'descr': %s, 'fortran_order': False, 'shape': %s, }"
 
 
 def member(descr: str = "'<f8'", shape: str = "(2,)", content: bytes = bytes(16)) -> bytes:
-    """Return an array as a file has it, of what its header says."""
-    header = (SAID % (descr, shape)).encode()
+    """Return an array in NumPy's format, with a header of any content."""
+    header = (HEADER % (descr, shape)).encode()
     return b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header + content
 
 
@@ -45,18 +45,18 @@ def archive(
         (member(shape="(-1,)"), r"the shape \(-1,\)"),
         (member(shape="(2.0,)"), r"the shape \(2.0,\)"),
         (member(shape="(True,)"), r"the shape \(True,\)"),
-        (member(shape="(" + "9" * 5000 + ",)"), "a strange header"),
-        (member(shape="(" * 3000), "something else, or a damaged one"),
+        (member(shape="(" + "9" * 5000 + ",)"), "an invalid header"),
+        (member(shape="(" * 3000), "something else, or a damaged file"),
         (member(descr="'<c16'", shape="(1,)"), "values of type '<c16'"),
         (member(descr="'|O'", shape="(2,)"), r"values of type '\|O'"),
         (member(descr="[('a', '<f8')]"), "values of type"),
-        (member(descr="'<f8', 'x': 1"), "a strange header"),
+        (member(descr="'<f8', 'x': 1"), "an invalid header"),
         (b"\x93NUMPY\x01\x00\xff\xff", "a header of 65535 bytes"),
-        (b"text", "a member 'a.npy', which is no array"),
-        (b"", "a member 'a.npy', which is no array"),
+        (b"text", "a member 'a.npy', which is not an array"),
+        (b"", "a member 'a.npy', which is not an array"),
     ],
 )
-def test_a_member_that_is_no_array_of_numbers_is_refused(
+def test_a_member_that_is_not_an_array_of_numbers_is_refused(
     tmp_path: Path, content: bytes, got: str
 ) -> None:
     with pytest.raises(FileFormatError, match=rf"x.npz: expected an archive of arrays.*{got}"):
@@ -64,13 +64,13 @@ def test_a_member_that_is_no_array_of_numbers_is_refused(
 
 
 def test_a_member_of_another_kind_of_file_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(FileFormatError, match=r"got a member 'notes.txt', which is no array"):
+    with pytest.raises(FileFormatError, match=r"got a member 'notes.txt', which is not an array"):
         read_arrays(archive(tmp_path, {"a.npy": member(), "notes.txt": b"text"}))
-    with pytest.raises(FileFormatError, match="got another compression than NumPy's"):
+    with pytest.raises(FileFormatError, match="got a compression other than deflate"):
         read_arrays(archive(tmp_path, {"a.npy": member()}, zipfile.ZIP_BZIP2))
 
 
-def test_an_archive_that_says_to_be_huge_takes_no_memory(tmp_path: Path) -> None:
+def test_an_archive_that_claims_to_be_huge_allocates_no_memory(tmp_path: Path) -> None:
     path = archive(tmp_path, {"a.npy": member(shape="(2000000000000,)")}, zipfile.ZIP_STORED)
     whole, size = path.read_bytes(), len(member(shape="(2000000000000,)"))
     lying = whole.replace(size.to_bytes(4, "little"), (2**32 - 2).to_bytes(4, "little"))
@@ -95,7 +95,7 @@ ARRAYS: list[Any] = [
 
 
 @pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
-def test_what_numpy_saves_is_read_as_numpy_reads_it(tmp_path: Path, save: Any) -> None:
+def test_arrays_saved_by_numpy_are_read_as_by_numpy(tmp_path: Path, save: Any) -> None:
     save(tmp_path / "x.npz", *ARRAYS)
     found = read_arrays(tmp_path / "x.npz")
     with np.load(tmp_path / "x.npz") as expected:

@@ -1,4 +1,4 @@
-"""Documents that others wrote: whatever stands in them, values of bounded size or one error."""
+"""Documents of any origin: values of bounded size, or one error."""
 
 from __future__ import annotations
 
@@ -33,27 +33,27 @@ def document(folder: Path, content: str | bytes) -> Path:
     [
         (read_toml, "a = " + "1" * 5000, r"got something else \(Exceeds the limit"),
         (read_toml, "a = 0x" + "f" * 5000, "got a whole number of more than 64 bits"),
-        (read_toml, "a = " + "[" * 5000 + "]" * 5000, "got more than 64 levels"),
+        (read_toml, "a = " + "[" * 5000 + "]" * 5000, "got more than 64 levels of nesting"),
         (read_toml, "a." * 200_000 + "b = 1", "got a key of more than 32 parts"),
         (read_toml, "a = 2020-12-01", "got a date"),
         (read_toml, "a = 2020-13-01", "got something else"),
         (read_toml, 'a = "\\u0000"', "got text with NUL"),
         (read_toml, b"a = 'b'\nc = '\xff'", "TOML in UTF-8, got another encoding at line 2"),
-        (read_toml, "#" * (2**20 + 1), "of at most 1048576 bytes, got a larger one"),
-        (read_yaml, "[" * 5000, "got more than 64 levels"),
-        (read_yaml, "- " * 5000, "got more than 64 levels"),
+        (read_toml, "#" * (2**20 + 1), "of at most 1048576 bytes, got a larger file"),
+        (read_yaml, "[" * 5000, "got more than 64 levels of nesting"),
+        (read_yaml, "- " * 5000, "got more than 64 levels of nesting"),
         (read_yaml, "a: &a [*a]", r"got something else \(.*recursive.*\) at line 1"),
         (read_yaml, "b0: &b0 [1]\n" + DOUBLED, "got more than 100000 values"),
         (read_yaml, 'a: "\\ud800"', "got text with NUL or an unpaired surrogate"),
-        (read_yaml, "#" * (2**16 + 1), "of at most 65536 bytes, got a larger one"),
-        (read_json, "[" * 100_000, "got more than 64 levels"),
+        (read_yaml, "#" * (2**16 + 1), "of at most 65536 bytes, got a larger file"),
+        (read_json, "[" * 100_000, "got more than 64 levels of nesting"),
         (read_json, "1" * 5000, r"got something else \(Exceeds the limit"),
         (read_json, "1" * 4000, "got a whole number of more than 64 bits"),
         (read_json, '"\\ud800"', "got text with NUL or an unpaired surrogate"),
         (read_json, "[1,\n2", r"got something else \(.*\) at line 2"),
     ],
 )
-def test_what_no_reader_can_use_is_refused(
+def test_invalid_documents_are_refused(
     tmp_path: Path, read: Reader, content: str | bytes, got: str
 ) -> None:
     with pytest.raises(FileFormatError, match=rf"document: expected .*{got}"):
@@ -61,8 +61,8 @@ def test_what_no_reader_can_use_is_refused(
 
 
 NAMES = {
-    "a\0b": "a name that no file can have",
-    "\ud800": "a name that no file can have",
+    "a\0b": "an invalid file name",
+    "\ud800": "an invalid file name",
     "x" * 300: "file name too long",
     "gone": "no file of that name",
     ".": "a folder",
@@ -84,7 +84,7 @@ def test_the_deepest_nesting_that_is_allowed_is_read(tmp_path: Path, read: Reade
     assert content == []
 
 
-def test_scalars_of_yaml_are_the_text_that_stands_there(tmp_path: Path) -> None:
+def test_scalars_of_yaml_are_text(tmp_path: Path) -> None:
     text = f"date: 2020-13-01\nlong: {'1' * 5000}\nyes: no\nnone:\n"
     assert read_yaml(document(tmp_path, text)) == {
         "date": "2020-13-01",
@@ -100,5 +100,5 @@ def test_the_largest_whole_numbers_of_64_bits_are_read(tmp_path: Path) -> None:
         parse_json(str(2**63))
 
 
-def test_a_byte_order_mark_is_passed_over(tmp_path: Path) -> None:
+def test_a_byte_order_mark_is_skipped(tmp_path: Path) -> None:
     assert read_toml(document(tmp_path, b"\xef\xbb\xbfa = 1")) == {"a": 1}

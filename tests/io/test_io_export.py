@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import numpy.testing as npt
 import pytest
+import yaml
 
 from groundmap.errors import InputError
 from groundmap.grid.grid import ConfidenceGrid
@@ -51,9 +52,7 @@ def test_a_ros_map_shows_each_state_with_the_largest_y_on_top(
     assert int((image == 205).sum()) == 64 * 64 - 3
 
 
-def test_a_ros_map_says_where_it_lies_with_every_digit(
-    grid: ConfidenceGrid, tmp_path: Path
-) -> None:
+def test_a_ros_map_gives_its_origin_with_all_digits(grid: ConfidenceGrid, tmp_path: Path) -> None:
     grid.tile((-1, -2))
     export(grid, tmp_path / "map.yaml")
     x, y = -6.1 - 128 * 0.1524, 2.3 - 64 * 0.1524
@@ -83,14 +82,25 @@ def test_map_server_reads_each_grey_as_the_state_it_was(
     npt.assert_array_equal(read, states)
 
 
-def test_numbers_and_names_are_yaml_whatever_they_are(tmp_path: Path) -> None:
-    grid = ConfidenceGrid(resolution=1e-05, origin=(1e22, 0.0))
+@pytest.mark.parametrize(
+    "name", ["a: b", "no", "it's", "Tür\t#1", "- x", "aaaaaa " * 30 + "x", "two\nlines"]
+)
+def test_numbers_and_names_round_trip_through_yaml(tmp_path: Path, name: str) -> None:
+    grid = ConfidenceGrid(resolution=1e-05, origin=(1e22, -6.1 - 128 * 0.1524))
     grid.tile((0, 0))
-    export(grid, tmp_path / "a: b.yaml")
-    text = (tmp_path / "a: b.yaml").read_text()
-    assert 'image: "a: b.pgm"\n' in text
-    assert "resolution: 1.0e-05\n" in text
-    assert "origin: [1.0e+22, 0.0, 0]\n" in text
+    export(grid, tmp_path / f"{name}.yaml")
+    text = (tmp_path / f"{name}.yaml").read_text(encoding="utf-8")
+    assert "resolution: 1.0e-05\n" in text  # YAML 1.1 reads 1e-05 as text
+    content = yaml.safe_load(text)
+    assert content["image"] == f"{name}.pgm"
+    assert content["resolution"] == grid.resolution
+    assert content["origin"] == [*grid.origin, 0]
+
+
+def test_a_name_that_yaml_cannot_hold_is_refused(grid: ConfidenceGrid, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"^path: expected a file name in UTF-8, got 'a.udcff.pgm"):
+        export(grid, tmp_path / "a\udcff.yaml")
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("origin", [(-6.1, 2.3), (-6.1, 2.3, 0.5)])

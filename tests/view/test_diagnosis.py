@@ -79,7 +79,7 @@ def street(
 
 
 def read_w_first(pose: Floats) -> Floats:
-    """Return the pose that comes of w x y z in a file of x y z w."""
+    """Return the pose as read from a file with quaternions w x y z instead of x y z w."""
     x, y, z, w = Rotation.from_matrix(pose[:3, :3]).as_quat()
     wrong = pose.copy()
     wrong[:3, :3] = Rotation.from_quat([w, x, y, z]).as_matrix()
@@ -98,8 +98,8 @@ def base_pose(camera: Floats) -> Floats:
 
 
 MOUNTED = replace(RIG, T_base_camera=MOUNT)
-W_FIRST, INVERTED = r"order w x y z", r"world to the camera"
-# A change of the poses, of the rig, what is said, and whether it takes landmark ids to see it.
+W_FIRST, INVERTED = "order w x y z", "transform world to camera coordinates"
+# A change of the poses, the rig, the reported cause, and whether its diagnosis needs landmark ids.
 POSES: list[tuple[Callable[[Floats], Floats], StereoRig, str, bool]] = [
     (lambda pose: map_from_world(read_w_first(pose), "optical"), RIG, W_FIRST, False),
     (lambda pose: read_w_first(base_pose(pose)), MOUNTED, W_FIRST, False),
@@ -114,7 +114,7 @@ POSES: list[tuple[Callable[[Floats], Floats], StereoRig, str, bool]] = [
     ),
     (lambda pose: pose, RIG, r"may be 'optical' \(.*, not 'rep103'", False),
     (base_pose, replace(RIG, T_base_camera=invert(MOUNT)), "T_base_camera may be inverted", True),
-    (lambda pose: map_from_world(pose, "optical"), MOUNTED, "the camera's own", False),
+    (lambda pose: map_from_world(pose, "optical"), MOUNTED, "may be those of the camera", False),
 ]
 
 
@@ -123,14 +123,14 @@ POSES: list[tuple[Callable[[Floats], Floats], StereoRig, str, bool]] = [
 def test_a_mistake_in_the_poses_is_the_only_cause_named(
     poses: Callable[[Floats], Floats], rig: StereoRig, cause: str, needs_ids: bool, ids: bool
 ) -> None:
-    found = likely_mistakes(street(poses=poses, rig=rig, ids=ids))
+    mistakes = likely_mistakes(street(poses=poses, rig=rig, ids=ids))
     if needs_ids and not ids:
-        assert found == []  # the poses alone are as plausible as any
+        assert mistakes == []  # the poses alone are plausible
     else:
-        assert len(found) == 1
-        assert found[0].startswith("Likely cause: ")
-        assert " Or " not in found[0]
-        assert re.search(cause, found[0])
+        assert len(mistakes) == 1
+        assert mistakes[0].startswith("Likely cause: ")
+        assert " Or " not in mistakes[0]
+        assert re.search(cause, mistakes[0])
 
 
 @pytest.mark.parametrize("how", [{}, {"camera_height": 1.6}])
@@ -146,7 +146,7 @@ def test_fit_ground_names_the_likely_cause_of_poses_that_it_refuses(
 def test_a_causal_fit_does_not_wait_for_more_views_to_name_the_cause() -> None:
     def first_then_fail() -> Iterator[View]:
         yield street(poses=POSES[0][0])[0]
-        raise AssertionError("the next view was asked for")
+        raise AssertionError("the next view was requested")
 
     with pytest.raises(NoGroundPlaneError, match="Likely cause: the quaternions"):
         list(fit_ground(first_then_fail(), causal=True))
@@ -155,7 +155,7 @@ def test_a_causal_fit_does_not_wait_for_more_views_to_name_the_cause() -> None:
 FEATURES: list[tuple[Callable[[Floats], Floats], StereoRig, str]] = [
     (lambda px: px[:, [1, 0, 2]], RIG, r"uL - uR is not above 0 in .* swapped"),
     (lambda px: px[:, [2, 2, 0]], RIG, r"columns \(u\) and rows \(v\)"),
-    (lambda px: px, replace(RIG, baseline=RIG.baseline * RIG.fx), r"fx times .* is then 0\.54 m"),
+    (lambda px: px, replace(RIG, baseline=RIG.baseline * RIG.fx), r"fx times .* would be 0\.54 m"),
     (lambda px: px, replace(RIG, baseline=540.0), r"or in millimetres \(0\.54 m\)"),
     (lambda px: px, replace(RIG, fx=4.0, fy=4.0), "focal length may be in millimetres"),
     (lambda px: px / RIG.fx, RIG, "may be normalised: expected pixels"),
@@ -169,8 +169,8 @@ def test_a_mistake_in_features_or_rig_is_named(
     pixels: Callable[[Floats], Floats], rig: StereoRig, cause: str
 ) -> None:
     views = street(pixels=pixels, rig=rig)
-    (found,) = likely_mistakes(views)
-    assert re.search(cause, found)
+    (mistake,) = likely_mistakes(views)
+    assert re.search(cause, mistake)
 
 
 @pytest.mark.parametrize(("pixels", "rig", "cause"), FEATURES[:4])
@@ -187,7 +187,7 @@ def test_fit_ground_counts_what_was_dropped_and_names_the_cause_instead_of_askin
 
 @pytest.mark.parametrize(
     ("axes", "scale", "cause"),
-    [([2, 0, 1], -1.0, "XYZ may be in other axes"), ([0, 1, 2], 1000.0, "in another unit")],
+    [([2, 0, 1], -1.0, "XYZ may have other axes"), ([0, 1, 2], 1000.0, "in another unit")],
 )
 def test_a_mistake_in_xyz_is_named(axes: list[int], scale: float, cause: str) -> None:
     views = []
@@ -195,8 +195,8 @@ def test_a_mistake_in_xyz_is_named(axes: list[int], scale: float, cause: str) ->
         xyz = view.points.xyz[:, axes] * scale
         features = Features.points(xyz, view.points.covariance)
         views.append(View(T_map_base=view.T_map_base, rig=RIG, points=features))
-    (found,) = likely_mistakes(views)
-    assert re.search(cause, found)
+    (mistake,) = likely_mistakes(views)
+    assert re.search(cause, mistake)
 
 
 @pytest.mark.parametrize("rig", [RIG, MOUNTED])
@@ -220,7 +220,7 @@ def test_ids_that_number_the_features_of_each_view_give_no_alarm() -> None:
 
 
 @pytest.mark.parametrize("views", [[], street()[:1]])
-def test_a_log_of_few_views_is_looked_at_as_far_as_it_goes(views: list[View]) -> None:
+def test_an_empty_log_and_a_single_view_give_no_alarm(views: list[View]) -> None:
     assert likely_mistakes(views) == []
 
 

@@ -1,4 +1,4 @@
-"""Fitting the ground to made-up roads: what it finds, what it reads, what it refuses."""
+"""Ground fitting on synthetic roads: the fitted planes, the views read, and the refused input."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def pose_at(x: float, y: float = 0.0, yaw: float = 0.0) -> Floats:
 
 
 def look(rng: np.random.Generator, xyz: Floats, *, noise_px: float = 0.3) -> Features:
-    """Return what a camera sees of points in its frame, through noisy pixels."""
+    """Return the features of points in the camera frame, from noisy pixels."""
     x, y, z = xyz.T
     scale = RIG.fx / z
     pixels = np.stack([x * scale + RIG.cx, (x - RIG.baseline) * scale + RIG.cx, y * scale + RIG.cy])
@@ -126,7 +126,7 @@ def test_a_tilted_road_is_found_among_obstacles_and_outliers(
         assert plane.support > 0
 
 
-def test_the_stated_tilt_covers_the_real_one_and_is_not_below_its_floor() -> None:
+def test_sigma_tilt_covers_the_real_error_and_is_not_below_its_floor() -> None:
     for view in fit_ground(drive(pitch=2.0, seed=4)):
         plane = plane_of(view)
         normal = T_REP103_OPTICAL[:3, :3].T @ Rotation.from_euler("y", 2, degrees=True).as_matrix()
@@ -136,7 +136,7 @@ def test_the_stated_tilt_covers_the_real_one_and_is_not_below_its_floor() -> Non
 
 @given(st.floats(-np.pi, np.pi), st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.floats(-50, 50))
 @settings(max_examples=15)
-def test_turning_and_shifting_the_map_leaves_the_planes_alone(
+def test_turning_and_shifting_the_map_does_not_change_the_planes(
     yaw: float, x: float, y: float, z: float
 ) -> None:
     views = drive(pitch=1.0, roll=-2.0, n_views=6, n_features=120)
@@ -160,7 +160,7 @@ def test_a_causal_window_never_uses_later_views(at: int, window: int, seed: int)
 
 @pytest.mark.parametrize("causal", [True, False])
 @pytest.mark.parametrize("window", [1, 2, 3, 4, 5, 10, 11])
-def test_a_plane_is_fitted_to_as_many_views_as_the_window_says(window: int, causal: bool) -> None:
+def test_a_plane_is_fitted_to_as_many_views_as_the_window_has(window: int, causal: bool) -> None:
     views = drive(n_views=24, n_features=60)
     middle = 12
     plane = plane_of(list(fit_ground(views, window=window, causal=causal))[middle])
@@ -192,7 +192,7 @@ def test_views_are_read_no_more_than_half_a_window_ahead(causal: bool, ahead: in
     assert len(read) == 12
 
 
-def test_nothing_is_read_before_the_first_view_is_asked_for() -> None:
+def test_nothing_is_read_before_the_first_view_is_requested() -> None:
     def source() -> Iterator[View]:
         raise AssertionError("read too early")
         yield
@@ -202,7 +202,7 @@ def test_nothing_is_read_before_the_first_view_is_asked_for() -> None:
 
 @pytest.mark.parametrize("n_views", [0, 1, 2, 5, 6, 7, 20])
 @pytest.mark.parametrize("causal", [True, False])
-def test_every_view_comes_out_once_in_order(n_views: int, causal: bool) -> None:
+def test_every_view_is_returned_once_in_order(n_views: int, causal: bool) -> None:
     views = drive(n_views=n_views, n_features=60)
     fitted = list(fit_ground(views, causal=causal))
     assert [view.timestamp for view in fitted] == [float(i) for i in range(n_views)]
@@ -232,12 +232,12 @@ def test_a_plane_is_carried_along_where_features_are_too_few() -> None:
 
 
 @pytest.mark.parametrize("n_features", [0, 3, 11])
-def test_too_few_features_with_no_plane_before_are_refused_with_what_to_do(
+def test_too_few_features_without_an_earlier_plane_are_refused_with_a_hint(
     n_features: int,
 ) -> None:
     views = drive(n_views=3, n_features=200)
     views[0] = replace(views[0], points=views[0].points.select(np.arange(n_features)))
-    message = rf"the {n_features} features of 1 views: give the camera's height .* T_base_camera"
+    message = rf"the {n_features} features of 1 views: give the height .* T_base_camera"
     with pytest.raises(NoGroundPlaneError, match=message):
         next(fit_ground(views, causal=True))
 
@@ -259,7 +259,7 @@ def test_features_on_one_line_are_no_plane() -> None:
     xyz = np.column_stack([np.zeros(50), np.full(50, 1.6), along])
     features = Features.points(xyz, np.broadcast_to(1e-4 * np.eye(3), (50, 3, 3)))
     view = View(T_map_base=T_REP103_OPTICAL, rig=RIG, points=features)
-    with pytest.raises(NoGroundPlaneError, match="holds enough of the 50 features of 1 views"):
+    with pytest.raises(NoGroundPlaneError, match="contains enough of the 50 features of 1 views"):
         list(fit_ground([view]))
 
 
@@ -271,7 +271,7 @@ def test_walls_alone_are_no_ground() -> None:
     features = Features.points(xyz, np.broadcast_to(1e-4 * np.eye(3), (200, 3, 3)))
     view = View(T_map_base=T_REP103_OPTICAL, rig=RIG, points=features)
     with pytest.raises(
-        NoGroundPlaneError, match=r"no plane between 0\.1 and 5 m below the camera holds enough"
+        NoGroundPlaneError, match=r"no plane between 0\.1 and 5 m below the camera contains enough"
     ):
         list(fit_ground([view]))
 
@@ -331,14 +331,14 @@ def test_features_out_of_range_are_left_out() -> None:
         assert plane_of(view).offset == pytest.approx(1.6, abs=0.03)
 
 
-def test_a_plane_given_by_hand_is_every_views_plane() -> None:
+def test_a_given_plane_is_the_plane_of_every_view() -> None:
     plane = GroundPlane(normal=np.array([0.0, -1.0, 0.0]), offset=1.23)
     fitted = list(fit_ground([*drive(n_views=2), emptied(drive(n_views=1)[0])], plane=plane))
     assert len(fitted) == 3
     assert all(view.plane is plane for view in fitted)
 
 
-def test_a_camera_height_is_level_ground_that_far_below() -> None:
+def test_a_given_camera_height_is_level_ground_that_far_below() -> None:
     for view in fit_ground(drive(n_views=2), camera_height=1.4):
         npt.assert_array_equal(plane_of(view).normal, (0, -1, 0))
         assert plane_of(view).offset == 1.4
@@ -351,7 +351,7 @@ def test_plane_and_camera_height_together_are_refused() -> None:
 
 
 @pytest.mark.parametrize("height", [0.0, -1.0, np.nan])
-def test_a_camera_height_that_is_none_is_refused(height: float) -> None:
+def test_a_camera_height_that_is_not_above_zero_is_refused(height: float) -> None:
     with pytest.raises(InputError, match=r"^camera_height: expected a number above 0"):
         list(fit_ground(drive(n_views=1), camera_height=height))
 
@@ -381,11 +381,11 @@ def test_a_camera_that_looks_at_the_ground_or_the_sky_is_refused(
 
 def test_poses_of_the_wrong_world_are_refused() -> None:
     views = [with_pose(view, invert(T_REP103_OPTICAL) @ view.T_map_base) for view in drive()]
-    with pytest.raises(NoGroundPlaneError, match="whether the data's world is 'optical'"):
+    with pytest.raises(NoGroundPlaneError, match="whether their world frame is 'optical'"):
         list(fit_ground(views))
 
 
-def test_views_before_a_refused_one_come_out_of_a_causal_window() -> None:
+def test_a_causal_window_returns_the_views_before_a_refused_one() -> None:
     views = drive(n_views=4)
     views[3] = with_pose(views[3], np.eye(4))
     fitted: Iterable[View] = fit_ground(views, causal=True)
@@ -414,7 +414,7 @@ def slope_ahead(angle: float, height: float, start: float, seed: int) -> list[Vi
     st.floats(-14, 14), st.floats(0.3, 1.6), st.sampled_from([0.0, 3.0]), st.integers(0, 2**32 - 1)
 )
 @settings(max_examples=40)
-def test_no_fitted_plane_is_nearer_or_farther_below_the_camera_than_the_settings_say(
+def test_fitted_planes_are_within_the_camera_heights_of_the_settings(
     angle: float, height: float, start: float, seed: int
 ) -> None:
     views = slope_ahead(angle, height, start, seed)
@@ -429,16 +429,16 @@ def test_no_fitted_plane_is_nearer_or_farther_below_the_camera_than_the_settings
 
 @pytest.mark.parametrize("angle", [-12.0, -11.0, -10.0, -8.0])
 @pytest.mark.parametrize("height", [0.3, 0.6])
-def test_a_ramp_down_ahead_is_mapped_or_refused_by_name(angle: float, height: float) -> None:
+def test_a_ramp_down_ahead_is_mapped_or_refused(angle: float, height: float) -> None:
     mapper = GroundMapper()
     try:
         for view in fit_ground(slope_ahead(angle, height, 0.0, 0)):
             mapper.integrate(view)
     except NoGroundPlaneError as error:
-        assert "give the camera's height" in str(error)  # noqa: PT017
+        assert "give the height of the camera" in str(error)  # noqa: PT017
 
 
-PLANE_ABOVE = r"got one 0\.5 m above it\. GroundPlane's offset .* --camera-height"
+PLANE_ABOVE = r"got one 0\.5 m above it\. The offset of a GroundPlane .* --camera-height"
 
 
 def test_a_given_plane_above_the_camera_is_refused_with_the_view_and_the_height() -> None:
@@ -452,7 +452,7 @@ def test_a_given_plane_above_the_camera_is_refused_with_the_view_and_the_height(
         mapper.integrate(views[1].with_plane(plane))
 
 
-def test_a_base_that_is_above_its_camera_does_not_tell_where_the_ground_is() -> None:
+def test_the_ground_of_a_base_above_its_camera_is_refused() -> None:
     mounting = np.eye(4)
     mounting[2, 3] = -0.5
     rig = replace(RIG, T_base_camera=mounting @ T_REP103_OPTICAL)
@@ -460,6 +460,6 @@ def test_a_base_that_is_above_its_camera_does_not_tell_where_the_ground_is() -> 
         list(fit_ground([View(T_map_base=pose_at(0.0), rig=rig)]))
 
 
-def test_limits_of_the_cameras_height_in_the_wrong_order_are_refused() -> None:
+def test_camera_heights_in_the_wrong_order_are_refused() -> None:
     with pytest.raises(SettingsError, match=r"^lowest_camera: expected at most highest_camera, 1"):
         list(fit_ground([], lowest_camera=2.0, highest_camera=1.0))

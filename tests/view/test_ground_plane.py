@@ -1,4 +1,4 @@
-"""The ground under one view: heights above a plane, and cameras that have none below them."""
+"""Ground planes: heights of points, and cameras that cannot have the ground below them."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def test_a_camera_below_its_ground_is_refused(height: float) -> None:
         ((0, 1), r"shape \(3,\)"),
     ],
 )
-def test_a_normal_that_is_no_unit_vector_is_refused(
+def test_a_normal_that_is_not_a_unit_vector_is_refused(
     normal: tuple[float, ...], message: str
 ) -> None:
     with pytest.raises(InputError, match=f"^normal: expected .*{message}"):
@@ -94,7 +94,7 @@ def test_a_normal_that_is_no_unit_vector_is_refused(
 @pytest.mark.parametrize(
     ("offset", "sigma_tilt"), [(np.nan, 0.0), (np.inf, 0.0), (0.0, np.nan), (0.0, -0.1)]
 )
-def test_a_plane_of_nan_or_negative_tilt_is_refused(offset: float, sigma_tilt: float) -> None:
+def test_a_plane_with_nan_or_a_negative_tilt_is_refused(offset: float, sigma_tilt: float) -> None:
     with pytest.raises(
         InputError, match=r"^plane: expected a finite offset \[m\] and a sigma_tilt"
     ):

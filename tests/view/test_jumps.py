@@ -1,4 +1,4 @@
-"""Jumps of the poses: found where nothing drove, and nowhere else."""
+"""Jumps of the poses: each is reported once, and real drives have none."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ DATA = Path(__file__).parents[3] / "shared" / "data"
 
 
 def driven(speeds: Floats, heading: float = 0.3) -> Floats:
-    """Return the places of a drive with these steps [m], in a slow curve."""
+    """Return the positions of a drive with these steps [m], in a slow curve."""
     turned = heading + np.cumsum(np.full(len(speeds), 0.02))
     steps = np.stack([speeds * np.cos(turned), speeds * np.sin(turned)], axis=1)
     return np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
 
 
-def test_a_view_that_lies_off_alone_is_named_once() -> None:
+def test_a_single_displaced_view_is_one_jump() -> None:
     places = driven(np.full(30, 0.8))
     places[12] += (0.0, 900.0)
     (jump,) = pose_jumps(places)
@@ -35,7 +35,7 @@ def test_a_view_that_lies_off_alone_is_named_once() -> None:
     assert jump.step == pytest.approx(900.0, abs=1.0)
 
 
-def test_poses_that_jump_for_good_are_named_where_they_do() -> None:
+def test_a_permanent_jump_is_reported_at_its_first_view() -> None:
     places = driven(np.full(30, 0.8))
     places[12:] += (40.0, 0.0)
     places[20:] -= (0.0, 25.0)
@@ -50,7 +50,7 @@ def test_the_last_of_few_views_may_jump(last: int) -> None:
 
 
 @pytest.mark.parametrize("places", [np.empty((0, 2)), np.zeros((1, 3)), np.zeros((5, 2))])
-def test_no_view_one_view_and_a_robot_that_stands_do_not_jump(places: Floats) -> None:
+def test_no_view_one_view_and_a_standing_robot_do_not_jump(places: Floats) -> None:
     assert pose_jumps(places) == []
 
 
@@ -84,7 +84,7 @@ def test_a_gap_in_time_lets_a_robot_drive_on() -> None:
     assert [jump.view for jump in pose_jumps(places, times)] == [15]
 
 
-def test_times_of_another_number_are_refused() -> None:
+def test_as_many_times_as_positions_are_required() -> None:
     with pytest.raises(InputError, match=r"^times: expected shape \(4,\), got shape \(3,\)"):
         pose_jumps(np.zeros((4, 2)), [0.0, 1.0, 2.0])
     with pytest.raises(InputError, match=r"^positions: expected finite numbers, got nan"):
@@ -129,7 +129,7 @@ def test_mapping_warns_of_a_jump_and_lists_it(tmp_path: Path) -> None:
     assert "steps are 0.5 m" in done.err
 
 
-def test_mapping_says_nothing_of_poses_that_do_not_jump(tmp_path: Path) -> None:
+def test_mapping_does_not_warn_without_a_jump(tmp_path: Path) -> None:
     done = run("map", moved({}, tmp_path / "log"), "--out", tmp_path / "map.npz", "--json")
     assert done.json["pose_jumps"] == []
     assert "warning" not in done.err

@@ -82,7 +82,7 @@ def test_covariance_is_the_noise_through_the_numerical_jacobian(
 
 
 @pytest.mark.parametrize("xyz", [(0.0, 0.0, 10.0), (4.0, -1.5, 9.0), (-2.0, 1.4, 4.0)])
-def test_covariance_is_that_of_many_noisy_matches(xyz: tuple[float, float, float]) -> None:
+def test_covariance_agrees_with_many_noisy_matches(xyz: tuple[float, float, float]) -> None:
     # 100,000 samples know a variance to 0.5 % (one sigma); curvature adds (0.7 px / 35 px)².
     rng = np.random.default_rng(7)
     pixels = project(RIG, np.array([xyz]))
@@ -100,7 +100,7 @@ def test_covariance_is_symmetric_and_positive(xyz: Floats) -> None:
     assert (np.linalg.eigvalsh(covariance) > 0).all()
 
 
-def test_depth_grows_uncertain_with_its_square() -> None:
+def test_the_standard_deviation_of_depth_grows_with_its_square() -> None:
     near, far = RIG.triangulate(project(RIG, np.array([(0, 0, 5.0), (0, 0, 10.0)]))).covariance
     assert np.sqrt(far[2, 2] / near[2, 2]) == pytest.approx(4.0)
 
@@ -129,7 +129,7 @@ def test_rows_without_a_point_are_dropped_and_counted_by_reason(
 
 @pytest.mark.parametrize("bad_end", [0, 1])
 @pytest.mark.parametrize("reason", BAD)
-def test_a_segment_with_one_bad_end_goes(bad_end: int, reason: str) -> None:
+def test_a_segment_with_one_bad_end_is_dropped(bad_end: int, reason: str) -> None:
     good = (40.0, 5.0, 1.0)
     segments = np.array([[good, good], [good, good], [good, good]])
     segments[1, bad_end] = BAD[reason][0]
@@ -146,7 +146,7 @@ def test_a_segment_bad_in_both_ways_counts_once() -> None:
 
 
 @pytest.mark.parametrize("shape", [(0, 3), (0, 2, 3)])
-def test_no_matches_are_no_points(shape: tuple[int, ...]) -> None:
+def test_no_matches_give_no_points(shape: tuple[int, ...]) -> None:
     found = RIG.triangulate(np.empty(shape))
     assert found.xyz.shape == shape
     assert found.covariance.shape == (*shape, 3)
@@ -164,7 +164,7 @@ def test_pixels_of_another_shape_are_refused(shape: tuple[int, ...], expected: s
 
 @pytest.mark.parametrize("name", ["fx", "fy", "baseline", "pixel_noise_px"])
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
-def test_a_rig_without_length_focus_or_noise_is_refused(name: str, value: float) -> None:
+def test_numbers_of_a_rig_that_are_not_above_zero_are_refused(name: str, value: float) -> None:
     with pytest.raises(CameraError, match=rf"^{name}: expected a number above 0 \["):
         replace(RIG, **{name: value})  # type: ignore[arg-type] # mypy knows no names in a dict
 

@@ -1,4 +1,4 @@
-"""Features and views: what is kept, what is dropped and counted, what is refused."""
+"""Features and views: the features kept, the features dropped and counted, the input refused."""
 
 from __future__ import annotations
 
@@ -123,12 +123,12 @@ def test_select_takes_rows_by_mask(mask: list[bool]) -> None:
 
 
 @pytest.mark.parametrize("n_ids", [0, 1, 3])
-def test_another_number_of_ids_is_refused(n_ids: int) -> None:
+def test_a_wrong_number_of_ids_is_refused(n_ids: int) -> None:
     with pytest.raises(InputError, match=f"of the 2 features, got 2 and {n_ids}"):
         Features.points(np.ones((2, 3)), spread(2), np.arange(n_ids))
 
 
-def test_another_number_of_covariances_is_refused() -> None:
+def test_a_wrong_number_of_covariances_is_refused() -> None:
     with pytest.raises(InputError, match="of the 2 features, got 3 and 2"):
         Features.points(np.ones((2, 3)), spread(3))
 
@@ -138,7 +138,7 @@ def test_ids_in_a_table_are_refused() -> None:
         Features.points(np.ones((2, 3)), spread(2), [[1, 2], [3, 4]])
 
 
-def test_ids_that_are_no_whole_numbers_are_refused() -> None:
+def test_ids_that_are_not_whole_numbers_are_refused() -> None:
     with pytest.raises(InputError, match="ids"):
         Features.points(np.ones((2, 3)), spread(2), [1.5, 2.0])
 
@@ -176,7 +176,7 @@ def test_a_covariance_of_another_shape_is_refused() -> None:
         (np.eye(3), r"shape \(4, 4\)"),
     ],
 )
-def test_a_pose_that_no_camera_can_have_is_refused(pose: Floats, message: str) -> None:
+def test_a_pose_that_is_not_a_rigid_transform_is_refused(pose: Floats, message: str) -> None:
     with pytest.raises(InputError, match=f"^T_map_base: expected .*{message}"):
         View(T_map_base=pose, rig=RIG)
 
@@ -186,7 +186,7 @@ def test_a_mirrored_pose_is_a_camera_error() -> None:
         View.from_pixels(np.diag([-1.0, 1.0, 1.0, 1.0]), RIG)
 
 
-def test_the_camera_stands_where_base_and_mounting_put_it() -> None:
+def test_the_pose_of_the_camera_is_that_of_base_and_mounting() -> None:
     mounting = np.array([[0, 0, 1, 0.2], [-1, 0, 0, 0.1], [0, -1, 0, 1.5], [0, 0, 0, 1.0]])
     pose = np.array([[0, -1, 0, 10.0], [1, 0, 0, 20.0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
     rig = StereoRig(fx=1.0, fy=1.0, cx=0.0, cy=0.0, baseline=1.0, T_base_camera=mounting)
@@ -195,7 +195,7 @@ def test_the_camera_stands_where_base_and_mounting_put_it() -> None:
     npt.assert_allclose(camera[:3, 2], (0, 1, 0))
 
 
-def test_with_plane_gives_another_view_and_leaves_this_one() -> None:
+def test_with_plane_returns_a_copy() -> None:
     view = bare_view(points=Features.points([(0, 0, -1), (0, 0, 1)], spread(2)), timestamp=3.0)
     plane = GroundPlane(normal=(0.0, -1.0, 0.0), offset=1.5)  # type: ignore[arg-type] # a tuple will do here
     standing = view.with_plane(plane)
@@ -215,7 +215,7 @@ def test_with_plane_gives_another_view_and_leaves_this_one() -> None:
     ],
 )
 @pytest.mark.parametrize("scale", [1e-12, 1.0, 1e12])
-def test_the_first_covariance_that_is_none_is_refused(
+def test_the_first_matrix_that_is_not_a_covariance_is_named(
     matrix: Floats, message: str, scale: float
 ) -> None:
     given = spread(6)
@@ -230,7 +230,7 @@ def test_the_first_covariance_that_is_none_is_refused(
         Features.segments(np.ones((6, 2, 3)), ends * scale)
 
 
-def test_covariances_that_are_singular_rounded_or_not_finite_are_taken() -> None:
+def test_covariances_that_are_singular_rounded_or_not_finite_are_accepted() -> None:
     direction = np.array([0.6, 0.0, 0.8])
     given = np.stack([np.zeros((3, 3)), np.outer(direction, direction), np.full((3, 3), np.nan)])
     given[1] = np.round(given[1] * 1.23456789, 6)
