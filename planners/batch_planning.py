@@ -19,7 +19,7 @@ from planners.errors import NoRouteError, ProblemError
 from planners.problem.problem import PlanningProblem
 from planners.registry import Planner, get_planner
 from planners.route.route import Route
-from planners.route.solve import solve, with_problem
+from planners.route.solve import solve
 from planners.search.base import Engine, SearchSettings, now
 
 Pair: TypeAlias = Sequence[Sequence[float] | Floats] | Floats  #: a start and a goal
@@ -125,10 +125,7 @@ def _problems(
     problem: PlanningProblem, pairs: Iterable[Pair], *, turned: tuple[str, ...]
 ) -> list[PlanningProblem]:
     """Return a problem for each pair, some of whose places need a yaw; they clear the same."""
-    if problem.grid.ndim != 2:
-        raise ProblemError(
-            "grid", "a 2-D map", f"a {problem.grid.ndim}-D one", hint="Use `plan` for each pair."
-        )
+    problem.check_dimensions(2, hint="Use `plan` for each pair.")
     if not isinstance(pairs, Iterable) or (isinstance(pairs, np.ndarray) and pairs.ndim == 0):
         raise ProblemError("pairs", "pairs of a start and a goal", repr(pairs))
     problems = []
@@ -181,7 +178,7 @@ def _route(desk: _Desk, engine: Engine, problem: PlanningProblem) -> Route:
     began = now()
     check_on_map(problem, goal=not desk.settings.takes_other_goals)
     return solve(
-        with_problem(desk.costmap, problem),
+        desk.costmap.with_problem(problem),
         engine,
         desk.settings,
         began=began,

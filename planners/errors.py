@@ -337,8 +337,8 @@ class AuditError(PlanningError):
 
     Examples
     --------
-    >>> print(AuditError("comes too near to non-free space", (3.0, 1.5), got=0.31, needed=0.9))
-    audit: the route comes too near to non-free space at (3.00, 1.50): expected 0.9 m, got 0.31 m.
+    >>> print(AuditError("comes too close to a non-free cell", (3.0, 1.5), got=0.31, needed=0.9))
+    audit: the route comes too close to a non-free cell at (3.00, 1.50): expected 0.9 m, got 0.31 m.
     """
 
     def __init__(
@@ -346,6 +346,6 @@ class AuditError(PlanningError):
     ) -> None:
         self.fault, self.xy, self.got, self.needed, self.unit = fault, xy, got, needed, unit
         super().__init__(
-            f"audit: the route {fault} at ({xy[0]:.2f}, {xy[1]:.2f}): "
+            f"audit: the route {fault} at {format_point(xy)}: "
             f"expected {needed:.9g} {unit}, got {got:.9g} {unit}."
         )

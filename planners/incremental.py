@@ -14,7 +14,6 @@ from planners.costmap.costmap import Costmap, whole_cells
 from planners.costmap.endpoint_check import check_on_map
 from planners.costmap.extent import padded_bounds
 from planners.error_messages import Point
-from planners.errors import ProblemError
 from planners.geometry.rounding import slack_at
 from planners.problem.problem import PlanningProblem
 from planners.route.route import Route
@@ -60,8 +59,7 @@ class IncrementalPlanner:
     """
 
     def __init__(self, problem: PlanningProblem, **settings: Any) -> None:
-        if problem.grid.ndim != 2:
-            raise ProblemError("grid", "a 2-D map", f"one of {problem.grid.ndim}-D")
+        problem.check_dimensions(2)
         self.problem = problem
         self.settings = DStarLiteSettings(**settings)
         self._costmap: Costmap | None = None

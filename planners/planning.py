@@ -5,16 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from planners.costmap.endpoint_check import check_on_map, space_of
-from planners.costmap.voxel_map import Voxels
 from planners.errors import ProblemError
 from planners.problem.problem import PlanningProblem
-from planners.registry import Planner, get_planner
+from planners.registry import Planner, get_planner, make_engine
 from planners.route.route import Route
 from planners.route.solve import solve
-from planners.search.astar3d import AStar3D
 from planners.search.base import Cancel, OnImproved, check_cancel, now
-
-SPATIAL = ("astar", "auto")  # planners that plan on 3-D maps, too
 
 
 def plan(
@@ -77,10 +73,9 @@ def plan(
     watch = _watch(planner, entry, on_improved=on_improved, cancel=cancel)
     check_on_map(problem, goal=not chosen.takes_other_goals)
     space = space_of(problem)
-    if isinstance(space, Voxels) and not entry.spatial:
-        return solve(space, _engine_3d(space, planner), chosen, began=began)
+    engine = make_engine(space, planner)
     headings = entry.headings and chosen.heeds_headings(problem)
-    return solve(space, entry.engine(space), chosen, began=began, headings=headings, watch=watch)
+    return solve(space, engine, chosen, began=began, headings=headings, watch=watch)
 
 
 def _watch(planner: str, entry: Planner, **watch: Any) -> dict[str, Any]:
@@ -93,10 +88,3 @@ def _watch(planner: str, entry: Planner, **watch: Any) -> dict[str, Any]:
         raise ProblemError("on_improved", "a callable", repr(asked["on_improved"]))
     check_cancel(asked.get("cancel"))
     return asked
-
-
-def _engine_3d(space: Voxels, planner: str) -> AStar3D:
-    if planner not in SPATIAL:
-        expected = f"one that plans on 3-D maps: {', '.join(SPATIAL)}, or a sampling one"
-        raise ProblemError("planner", expected, repr(planner))
-    return AStar3D(space)

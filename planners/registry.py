@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator, MutableMapping
 from functools import cache, partial
 from typing import NamedTuple
 
+from planners.costmap.costmap import Costmap
+from planners.costmap.map_space import MapSpace
 from planners.errors import ProblemError
 from planners.sampling.ompl_module import samplers
 from planners.sampling.ompl_search import THREADED
@@ -20,6 +22,7 @@ from planners.search.astar import (
     WeightedAStar,
     WeightedAStarSettings,
 )
+from planners.search.astar3d import AStar3D
 from planners.search.auto import Auto, AutoSettings
 from planners.search.base import Engine, SearchSettings
 from planners.search.dstar_lite import DStarLite, DStarLiteSettings
@@ -32,12 +35,12 @@ from planners.search.theta import LazyTheta, LazyThetaSettings, Theta, ThetaSett
 class Planner(NamedTuple):
     """A planner."""
 
-    engine: Callable[..., Engine]  #: made on a `Costmap`; some also on `Voxels`
+    engine: Callable[..., Engine]  #: makes its search engine on a `Costmap`
     settings: type[SearchSettings]  #: class of its settings
     headings: bool = False  #: whether it heeds headings
     anytime: bool = False  #: whether it tells of routes while it searches, and can be cancelled
-    spatial: bool = False  #: whether it can be made on `Voxels`
-    repeatable: bool = True  #: whether it repeats a route exactly, if no time limit ends it
+    engine_3d: Callable[..., Engine] | None = None  #: makes its search engine on `Voxels`
+    repeatable: bool = True  #: whether it repeats a route exactly unless a time limit ends it
 
 
 class Planners(MutableMapping[str, Planner]):
@@ -83,7 +86,7 @@ def _sampling() -> dict[str, Planner]:
             SamplingSettings,
             headings=True,
             anytime=True,
-            spatial=True,
+            engine_3d=partial(SamplingPlanner, name),
             repeatable=name not in THREADED,
         )
         for name in samplers()
@@ -91,9 +94,9 @@ def _sampling() -> dict[str, Planner]:
 
 
 OWN_PLANNERS: dict[str, Planner] = {
-    "astar": Planner(AStar, AStarSettings),
+    "astar": Planner(AStar, AStarSettings, engine_3d=AStar3D),
     "ara": Planner(ARA, ARASettings, anytime=True),
-    "auto": Planner(Auto, AutoSettings),
+    "auto": Planner(Auto, AutoSettings, engine_3d=AStar3D),
     "dijkstra": Planner(Dijkstra, DijkstraSettings),
     "dstar_lite": Planner(DStarLite, DStarLiteSettings),
     "hybrid_astar": Planner(HybridAStar, HybridAStarSettings, headings=True),
@@ -123,3 +126,26 @@ def get_planner(planner: str) -> Planner:
             hint="" if samplers() else "Sampling planners need OMPL: pip install ompl.",
         )
     return PLANNERS[planner]
+
+
+def make_engine(space: MapSpace, planner: str) -> Engine:
+    """Return the search engine of a planner on a map.
+
+    Parameters
+    ----------
+    space : Costmap or Voxels
+    planner : str
+        A name in `PLANNERS`.
+
+    Raises
+    ------
+    ProblemError
+        A 3-D map, which the planner does not support.
+    """
+    entry = PLANNERS[planner]
+    make = entry.engine if isinstance(space, Costmap) else entry.engine_3d
+    if make is None:
+        own = (name for name, one in OWN_PLANNERS.items() if one.engine_3d is not None)
+        expected = f"one that supports 3-D maps: {', '.join(own)} or a sampling planner"
+        raise ProblemError("planner", expected, repr(planner))
+    return make(space)

@@ -169,7 +169,7 @@ def test_the_audit_catches_changes_that_were_not_said() -> None:
     planner = IncrementalPlanner(problem_on(free_field(SIDE, SIDE)))
     x, y = planner.plan().waypoints[1:3].mean(axis=0)
     put(planner.problem.grid, int(y), int(x), BLOCKED)
-    with pytest.raises(AuditError, match="comes too near to a nonfree cell"):
+    with pytest.raises(AuditError, match="comes too close to a non-free cell"):
         planner.plan()
 
 

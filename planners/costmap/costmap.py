@@ -9,25 +9,22 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import Bools, Bytes, Floats, Ints, Ints32
+from groundmap.arrays import Bools, Bytes, Ints, Ints32
 from groundmap.grid.window import GridWindow
 from planners.costmap.extent import padded_window
-from planners.costmap.kernels.distance import NOWHERE, squared_distances
 from planners.costmap.kernels.moves import DIAGONAL, ONE
-from planners.costmap.layers import Layers, cap, layers_of, metres
-from planners.costmap.moves import allowed_moves, squared_need
+from planners.costmap.layers import Layers, cap, layers_of
+from planners.costmap.map_space import MapSpace
+from planners.costmap.moves import allowed_moves
 from planners.errors import ProblemError
-from planners.geometry.kernels.clearance import line_clearance
-from planners.geometry.rounding import slack_at
 from planners.problem.costs import MAX_NON_OBSTACLE
 from planners.problem.problem import PlanningProblem
 
-FIRST_REACH = 64  # [cells] around cells in which blocked ones are looked for at first
 MOST_COST = 2**30  # [cells] of a route: as much again is left for estimates and their weights
 
 
 @dataclass(frozen=True, eq=False)
-class Costmap:
+class Costmap(MapSpace):
     """Which cells are blocked, where the footprint's centre may be, and what that costs.
 
     Attributes
@@ -57,17 +54,19 @@ class Costmap:
     ((68, 68), 31.5, [255, 255, 253, 0, 0])
     """
 
-    problem: PlanningProblem
-    window: GridWindow
-    blocked: Bools
-    nonfree: Bools
-    cleared: Bools
     squared: Ints32
     costs: Bytes
 
     @classmethod
     def of(cls, problem: PlanningProblem) -> Costmap:
-        """Return the costmap of a problem whose start is on the map."""
+        """Return the costmap of a problem on a 2-D map whose start is on the map.
+
+        Raises
+        ------
+        ProblemError
+            A 3-D map, or one with too many cells.
+        """
+        problem.check_dimensions(2)
         window = padded_window(problem)
         return cls(problem, window, *layers_of(problem, window))
 
@@ -115,16 +114,6 @@ class Costmap:
         return self.problem.grid.window(
             np.concatenate([self.window.origin + low * size, self.window.origin + high * size])
         )
-
-    @property
-    def radius(self) -> float:
-        """Distance that the footprint's centre keeps from what is blocked [m]."""
-        return self.problem.radius
-
-    @property
-    def slack(self) -> float:
-        """Shortfall of the radius that is put down to rounding, on lines from start to goal [m]."""
-        return slack_at(self.problem.start_xy, self.problem.goal_xy)
 
     @property
     def width(self) -> int:
@@ -194,60 +183,6 @@ class Costmap:
     def moves(self) -> Bytes:
         """Allowed moves between such cells, a bit each, shape (rows, cols)."""
         return allowed_moves(self.traversable)
-
-    @cached_property
-    def all_squared(self) -> Ints32:
-        """As `squared`, however far, shape (rows, cols) [(half cells)²]."""
-        return squared_distances(self.blocked, NOWHERE)
-
-    @cached_property
-    def clearance(self) -> Floats:
-        """Distance from cell centres to the nearest blocked square, shape (rows, cols) [m]."""
-        return metres(self.all_squared, self.window.resolution)
-
-    def traversable_for(self, radius: float) -> Bools:
-        """Return where the centre of a disc of another radius [m] may be, shape (rows, cols)."""
-        return ~self.blocked & (self.all_squared >= squared_need(radius, self.window.resolution))
-
-    def clearance_at(self, cells: Ints) -> Floats:
-        """Return the clearance of cell centres [row, col], shape (n,) [m]."""
-        known = "all_squared" in vars(self)
-        squared = self.all_squared[tuple(cells.T)] if known else self._squared_at(cells)
-        return metres(squared, self.window.resolution)
-
-    def _squared_at(self, cells: Ints) -> Ints32:
-        """Return `all_squared` at cells, worked out around them only as far as that is needed."""
-        first, last, reach = cells.min(axis=0), cells.max(axis=0) + 1, FIRST_REACH
-        while True:
-            low = np.maximum(first - reach, 0)
-            high = np.minimum(last + reach, self.blocked.shape)
-            part = squared_distances(self.blocked[_slices(low, high)], NOWHERE)
-            squared: Ints32 = part[tuple((cells - low).T)]
-            # What is left out begins more than `reach` cells away from all of the cells.
-            if squared.max() <= (2 * reach) ** 2 or part.shape == self.blocked.shape:
-                return squared
-            reach *= 4
-
-    def to_cells(self, points: npt.ArrayLike) -> Floats:
-        """Return positions [m, map] in cells from the window's outer corner, shape (n, 2)."""
-        shifted: Floats = np.atleast_2d(np.asarray(points, dtype=np.float64)) - self.window.origin
-        return shifted / self.window.resolution
-
-    def clearance_of(
-        self, points: npt.ArrayLike, *, to: Bools | None = None, limit: float = math.inf
-    ) -> float:
-        """Return the exact distance of a point or a polyline to the nearest blocked square [m].
-
-        Parameters
-        ----------
-        points : array_like, shape (2,) or (n, 2) [m, map]
-        to : ndarray of bool, shape (rows, cols), optional
-            Other cells than the blocked ones.
-        limit : float, default inf [m]
-            Nothing farther away is looked for.
-        """
-        mask, size = self.blocked if to is None else to, self.window.resolution
-        return line_clearance(mask, self.to_cells(points), limit / size) * size
 
 
 def whole_cells(changed: npt.ArrayLike) -> Ints:

@@ -21,6 +21,7 @@ from planners.geometry.kernels.swept_footprint import pose_clear
 from planners.geometry.rounding import rounding_at, slack_at
 from planners.problem.problem import PlanningProblem, Pose
 
+SPACES: dict[int, type[Costmap | Voxels]] = {2: Costmap, 3: Voxels}  # by dimension of the map
 MOST_LOOKUPS = 64  # tiles near a place beyond which all touched tiles are looked at instead
 
 
@@ -33,8 +34,7 @@ def costmap_of(problem: PlanningProblem) -> Costmap:
         A 3-D map.
     OutsideMapError, NonFreeError, UnknownSpaceError
     """
-    if problem.grid.ndim != 2:
-        raise ProblemError("grid", "a 2-D map", f"one of {problem.grid.ndim}-D")
+    problem.check_dimensions(2)
     check_on_map(problem)
     costmap = Costmap.of(problem)
     check_space(costmap, "start", problem.start_xy)
@@ -161,7 +161,7 @@ def nearest_place(
     free = space.traversable if yaw is None else ~space.blocked
     other = problem.goal_xy if place == "start" else problem.start_xy
     radius = space.radius if yaw is None else 0.0
-    cells = np.argwhere(_part_around(space, free, other, radius=radius))
+    cells = np.argwhere(region_around(space, free, other, radius=radius, or_largest=True))
     centres: Floats = space.window.cell_to_world(cells)
     away = np.hypot.reduce(centres - xy, axis=1)
     if yaw is None:
@@ -173,24 +173,37 @@ def nearest_place(
     return None
 
 
-def _part_around(space: MapSpace, free: Bools, xy: Point, *, radius: float) -> Bools:
-    """Return the cells that are connected to a place; if there are none, the largest part.
+def region_around(
+    space: MapSpace, free: Bools, xy: Point, *, radius: float, or_largest: bool = False
+) -> Bools:
+    """Return the cells that are connected to a place.
 
-    Moves lead over the sides of cells, as all cells that a diagonal move spans are free.
+    Moves pass through the sides of cells, as a diagonal move requires all cells that it spans.
+
+    Parameters
+    ----------
+    space : Costmap or Voxels
+    free : ndarray of bool, shape as `space.blocked`
+        Cells that may be visited.
+    xy : tuple of float [m, map]
+    radius : float [m]
+        Clearance on the way to the cells around the place.
+    or_largest : bool, default False
+        Whether to return the largest region if the place is connected to no cell.
     """
     parts, count = ndimage.label(free)
     around = np.unique(parts[tuple(_cells_around(space, xy, radius=radius).T)])
     around = around[around > 0]
-    if len(around) == 0 and count > 0:
+    if or_largest and len(around) == 0 and count > 0:
         around = np.array([1 + np.bincount(parts.ravel())[1:].argmax()])
-    part: Bools = np.isin(parts, around)
-    return part
+    region: Bools = np.isin(parts, around)
+    return region
 
 
 def _cells_around(space: MapSpace, xy: Point, *, radius: float) -> Ints:
-    """Return the cells that a disc's place is joined to; of a ball's on voxels, those around it."""
+    """Return the cells that a place is connected to; on voxels, the up to eight around it."""
     if isinstance(space, Costmap):
-        return links(space, (xy[0], xy[1]), radius=radius).cells
+        return links(space, xy, radius=radius).cells
     position = space.to_cells(xy)[0][::-1]
     around = product(*(centres_around(at, 0.0) for at in position.tolist()))
     cells = np.array(list(around), dtype=np.int64)
@@ -229,8 +242,8 @@ def _fits(space: MapSpace, blocked: Bools, xy: Point, yaw: float | None) -> bool
 
 
 def space_of(problem: PlanningProblem) -> Costmap | Voxels:
-    """Return the map as a problem sees it: a costmap, or voxels."""
-    return Costmap.of(problem) if problem.grid.ndim == 2 else Voxels.of(problem)
+    """Return the map as a problem sees it: a costmap, or voxels on a 3-D map."""
+    return SPACES[problem.grid.ndim].of(problem)
 
 
 def _touches_tile(problem: PlanningProblem, xy: Point, margin: float) -> bool:

@@ -139,6 +139,16 @@ got (0, nan).
         return tuple(map(float, self.goal[: self.grid.ndim]))
 
     @property
+    def start_yaw(self) -> float | None:
+        """Yaw at the start [rad], or None."""
+        return _yaw(self.start, self.grid.ndim)
+
+    @property
+    def goal_yaw(self) -> float | None:
+        """Yaw at the goal [rad], or None."""
+        return _yaw(self.goal, self.grid.ndim)
+
+    @property
     def clear_place(self) -> Point:
         """Where unknown cells count as free: x, y (in 3-D: x, y, z) [m, map]."""
         place = self.start if self.cleared_at is None else self.cleared_at
@@ -156,6 +166,23 @@ got (0, nan).
             return self.radius + self.shape.width / 2.0
         return self.clear_start_radius
 
+    def check_dimensions(self, dimensions: int, *, hint: str = "") -> None:
+        """Check that the map has a number of dimensions.
+
+        Parameters
+        ----------
+        dimensions : {2, 3}
+        hint : str, optional
+            What to do otherwise, for the message.
+
+        Raises
+        ------
+        ProblemError
+        """
+        if self.grid.ndim != dimensions:
+            expected, got = f"a {dimensions}-D map", f"a {self.grid.ndim}-D map"
+            raise ProblemError("grid", expected, got, hint=hint)
+
 
 def _pose(name: str, values: Sequence[float] | Floats, ndim: int) -> tuple[float, ...]:
     axes = "x, y" if ndim == 2 else "x, y, z"
@@ -165,6 +192,10 @@ def _pose(name: str, values: Sequence[float] | Floats, ndim: int) -> tuple[float
     if not places or len(values) not in (ndim, ndim + 1) or not all(map(is_number, values)):
         raise ProblemError(name, expected, repr(values))
     return tuple(map(float, values))
+
+
+def _yaw(pose: Sequence[float] | Floats, ndim: int) -> float | None:
+    return float(pose[ndim]) if len(pose) > ndim else None
 
 
 def _radius(name: str, value: float) -> float:

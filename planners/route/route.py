@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from os import PathLike
-from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 import shapely
-import yaml
 
 from groundmap.arrays import Bools, Floats
-from groundmap.errors import InputError
-from groundmap.files.archive import write_atomically
 from planners.costmap.map_space import MapSpace
 from planners.geometry.polyline import CrossedCells, cross_cells, distances_to, length_of
 from planners.problem.problem import PlanningProblem
+from planners.route.route_files import (
+    Format,
+    csv_table,
+    dump_json,
+    dump_yaml,
+    format_of,
+    path_message,
+    write_text,
+)
 from planners.search.base import SearchResult
 from planners.search.graph import Graph
 
@@ -163,27 +167,11 @@ class Route:
         >>> pose["position"], round(pose["orientation"]["z"], 3)
         ({'x': 2.25, 'y': 2.25, 'z': 0.0}, 0.707)
         """
-        header = {"frame_id": self.frame, "stamp": {"sec": 0, "nanosec": 0}}
-        poses = [
-            {
-                "header": header,
-                "pose": {
-                    "position": dict(zip("xyz", [*place, 0.0], strict=False)),
-                    "orientation": _quaternion(yaw),
-                },
-            }
-            for place, yaw in zip(self.waypoints.tolist(), self.headings.tolist(), strict=True)
-        ]
-        return {"header": header, "poses": poses}
+        return path_message(self.frame, self.waypoints, self.headings)
 
     def to_csv(self) -> str:
         """Return a line per waypoint: x, y (and z) [m], yaw [rad], distance along the route [m]."""
-        steps = np.linalg.norm(np.diff(self.waypoints, axis=0), axis=1)
-        along = np.append(0.0, np.cumsum(steps))
-        table = np.column_stack([self.waypoints, self.headings, along])
-        lines = [",".join(map(repr, row)) for row in table.tolist()]
-        axes = ",".join("xyz"[: self.waypoints.shape[1]])
-        return "\n".join([f"{axes},yaw,distance", *lines, ""])
+        return csv_table(self.waypoints, self.headings)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the route to a file, all or nothing; the name's ending says how.
@@ -198,8 +186,12 @@ class Route:
         OSError
             The folder does not exist or can't be written to.
         """
-        check_route_file(path)
-        _write(path, WRITERS[Path(path).suffix.lower()](self))
+        texts: dict[Format, Callable[[], str]] = {
+            "geojson": lambda: dump_json(self.to_geojson()),
+            "csv": self.to_csv,
+            "path": lambda: dump_yaml(self.to_path()),
+        }
+        write_text(path, texts[format_of(path)]())
 
     def save_geojson(self, path: str | PathLike[str]) -> None:
         """Write the GeoJSON Feature to a file, all or nothing.
@@ -209,66 +201,16 @@ class Route:
         OSError
             The folder does not exist or can't be written to.
         """
-        _write(path, _geojson(self))
-
-
-def check_route_file(path: str | PathLike[str]) -> None:
-    """Check that a route can be written to a file of that name.
-
-    Raises
-    ------
-    InputError
-        Another ending than `WRITERS` has.
-    """
-    if Path(path).suffix.lower() not in WRITERS:
-        expected = f"a name that ends in {', '.join(WRITERS)}"
-        raise InputError("path", expected, repr(str(path)))
-
-
-def _geojson(route: Route) -> str:
-    return json.dumps(route.to_geojson(), indent=2) + "\n"
-
-
-class _PlainDumper(yaml.SafeDumper):
-    """Writes what comes twice twice, as not every reader knows YAML's references."""
-
-    def ignore_aliases(self, data: object) -> bool:
-        return True
-
-
-def _path_yaml(route: Route) -> str:
-    return yaml.dump(route.to_path(), Dumper=_PlainDumper, sort_keys=False)
-
-
-WRITERS: dict[str, Callable[[Route], str]] = {
-    ".geojson": _geojson,
-    ".json": _geojson,
-    ".csv": Route.to_csv,
-    ".yaml": _path_yaml,
-    ".yml": _path_yaml,
-}
-
-
-def _write(path: str | PathLike[str], text: str) -> None:
-    def write(stream: IO[bytes]) -> None:
-        stream.write(text.encode())
-
-    write_atomically(path, write)
+        write_text(path, dump_json(self.to_geojson()))
 
 
 def _headings(waypoints: Floats, problem: PlanningProblem) -> Floats:
     """Return where a robot looks that drives along a line; standing, as it was asked to."""
     dx, dy = np.diff(waypoints, axis=0).T[:2]
     headings = np.arctan2(dy, dx)
-    ndim = problem.grid.ndim
-    if not (dx.any() or dy.any()) and len(problem.start) > ndim:
-        headings[:] = problem.start[ndim]
-    last = problem.goal[ndim] if len(problem.goal) > ndim else headings[-1]
-    return np.append(headings, last)
-
-
-def _quaternion(yaw: float) -> dict[str, float]:
-    return {"x": 0.0, "y": 0.0, "z": math.sin(yaw / 2.0), "w": math.cos(yaw / 2.0)}
+    if not (dx.any() or dy.any()) and problem.start_yaw is not None:
+        headings[:] = problem.start_yaw
+    return np.append(headings, headings[-1] if problem.goal_yaw is None else problem.goal_yaw)
 
 
 def _mean(values: Floats, weights: Floats) -> float:
@@ -292,8 +234,7 @@ def _start_unknown_area(space: MapSpace, result: SearchResult, line: CrossedCell
     used = np.zeros_like(space.cleared)
     used[space.cleared] = _cover(space, result, centres)
     used[tuple(line.cells.T)] = True
-    cells = float((used & space.cleared).sum())
-    return cells * space.window.resolution**space.cleared.ndim
+    return space.area_of(used & space.cleared)
 
 
 def _cover(space: MapSpace, result: SearchResult, places: Floats) -> Bools:

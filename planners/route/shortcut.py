@@ -14,9 +14,9 @@ from planners.geometry.polyline import length_of, merge_collinear
 from planners.geometry.rounding import rounding_at
 from planners.problem.costs import MAX_NON_OBSTACLE
 from planners.problem.problem import PlanningProblem
-from planners.route.build import build_route
 from planners.route.kernels.shortcut import best_chain, leg_cost
 from planners.route.route import Route
+from planners.route.solve import build_route
 from planners.search.base import SearchResult
 
 AHEAD, AHEAD_DENSE = 128, 16  # points that a leg may skip: bounds the time on routes of many turns
@@ -93,8 +93,7 @@ def costmap_for(problem: PlanningProblem, route: Route) -> Costmap:
     ProblemError
         See `shortcut`.
     """
-    if problem.grid.ndim != 2:
-        raise ProblemError("problem", "one on a 2-D map", f"one on a {problem.grid.ndim}-D map")
+    problem.check_dimensions(2)
     ends = np.array([problem.start_xy, problem.goal_xy])
     if np.abs(route.waypoints[[0, -1]] - ends).max() > SAME_PLACE + rounding_at(ends):
         got = " to ".join(f"({x:.2f}, {y:.2f})" for x, y in route.waypoints[[0, -1]].tolist())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,10 +14,10 @@ from planners.error_messages import Point
 from planners.errors import ProblemError, SmoothingError
 from planners.geometry.polyline import length_of
 from planners.problem.problem import PlanningProblem
-from planners.route.build import build_route
 from planners.route.kernels.smooth import free_discs, relax
 from planners.route.route import Route
 from planners.route.shortcut import cost_of, costmap_for, tighten
+from planners.route.solve import build_route
 from planners.search.base import Clock, SearchResult, check_limit
 
 ROUNDS, INNER = 24, 100  # of discs found anew, and of the relaxation in between
@@ -159,7 +158,7 @@ def _goals(costmap: Costmap, route: Route, turning_radius: float, spacing: float
         expected = f"one that makes {MOST} waypoints at most, {route.length / MOST:g} m"
         hint = "It is a quarter of the turning radius unless told."
         raise ProblemError("spacing", expected, f"{spacing:g} m", hint=hint)
-    yaws = _yaw(costmap.problem.start), _yaw(costmap.problem.goal)
+    yaws = costmap.problem.start_yaw, costmap.problem.goal_yaw
     return _Goals(turning_radius, spacing, yaws)
 
 
@@ -289,7 +288,3 @@ def _worst_place(costmap: Costmap, line: Floats, turning_radius: float) -> Point
         worst = int(np.argmin([costmap.clearance_of(point) for point in line[1:-1]]))
     x, y = line[1 + worst].tolist()
     return x, y
-
-
-def _yaw(place: Sequence[float] | Floats) -> float | None:
-    return float(place[2]) if len(place) > 2 else None

@@ -16,7 +16,7 @@ from scipy.optimize import minimize_scalar
 from groundmap.arrays import Bools, Floats
 from groundmap.grid.grid import ConfidenceGrid
 from planners import AuditError, PlanningProblem
-from planners.audit.audit3d import audit3d
+from planners.audit.audit import audit
 from planners.costmap.kernels.distance import NOWHERE
 from planners.costmap.voxel_map import Voxels, squared_distances
 from planners.geometry.rounding import SLACK
@@ -150,10 +150,10 @@ def test_a_line_is_clear_if_and_only_if_the_audit_passes_it(
         start, goal = validator.poses([a, b])
         asked = asked_along(validator, start, goal)
         if validator.is_clear(*a, *b):
-            audit3d(asked, np.array([start, goal]))
+            audit(asked, np.array([start, goal]))
         else:
-            with pytest.raises(AuditError, match="comes too near to"):
-                audit3d(asked, np.array([start, goal]))
+            with pytest.raises(AuditError, match="comes too close to"):
+                audit(asked, np.array([start, goal]))
 
 
 def asked_along(validator: MotionValidator3D, start: Floats, goal: Floats) -> PlanningProblem:
