@@ -51,7 +51,7 @@ def plan(
     TimeLimitError
         Time ran out.
     CancelledError
-        The search was cancelled before there was a route.
+        The search was cancelled before a route was found.
     UnsolvedError
         A sampling planner ended without a route.
     AuditError

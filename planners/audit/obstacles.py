@@ -85,7 +85,8 @@ def obstacles_near(
     lower = window.origin + cells[:, ::-1] * window.resolution
     upper = window.origin + (cells[:, ::-1] + 1) * window.resolution
     obstacles = Obstacles(lower, upper, states[tuple(cells.T)])
-    return Obstacles(*(part[_forbidden(problem, obstacles, tolerance)] for part in obstacles))
+    kept = _forbidden(problem, obstacles, tolerance)
+    return Obstacles(lower[kept], upper[kept], obstacles.states[kept])
 
 
 def _forbidden(problem: PlanningProblem, cells: Obstacles, tolerance: float) -> Bools:

@@ -111,7 +111,7 @@ def check_start_is_known(space: MapSpace) -> None:
     """Check that the start, from which no route was found, is no island in unknown space.
 
     The unknown cells near the start count as free. Where unknown cells alone keep even a point in
-    there, the start lies in unknown space, and is not fenced in.
+    there, the start lies in unknown space, and is not enclosed.
 
     Parameters
     ----------

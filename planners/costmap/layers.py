@@ -1,4 +1,4 @@
-"""What the cells of a window are to a problem: blocked, how far from that, how dear."""
+"""Per-cell masks, distances and costs."""
 
 from __future__ import annotations
 
@@ -84,18 +84,24 @@ def layers_of(problem: PlanningProblem, window: GridWindow) -> Layers:
 
 
 def cap(problem: PlanningProblem) -> int:
-    """Return the squared distance beyond which nothing changes [(half cells)²]."""
+    """Return the squared distance beyond which no layer depends on it [(half cells)²]."""
     farthest = max(problem.radius, problem.costs.reach)
     return min(squared_need(farthest, problem.grid.resolution), NOWHERE)
 
 
 def metres(squared: Ints32, resolution: float) -> Floats:
-    """Return distances [m] of squared ones in half cells."""
+    """Return distances in metres.
+
+    Parameters
+    ----------
+    squared : ndarray of int32 [(half cells)²]
+    resolution : float [m]
+    """
     return np.where(squared == NOWHERE, np.inf, np.sqrt(squared) * (resolution / 2.0))
 
 
 def _near_start(problem: PlanningProblem, window: GridWindow) -> Bools:
-    """Return which cells' squares (cubes) come within the clear radius of the cleared place."""
+    """Return the cells whose square or cube comes within the clear radius of the cleared place."""
     near = np.zeros(window.count.shape, dtype=np.bool_)
     if not problem.clear_start:
         return near

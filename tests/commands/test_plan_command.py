@@ -73,7 +73,7 @@ def test_a_planner_that_can_not_is_named_and_the_others_go_on(wall: Path) -> Non
 def test_where_no_planner_finds_a_route_the_reason_is_said(wall: Path) -> None:
     ran = plan(wall, "--planner", "all", footprint="1.2")
     assert ran.code == 3
-    assert "your footprint needs 2.40 m" in ran.json["reason"]
+    assert "the footprint needs 2.40 m" in ran.json["reason"]
 
 
 def test_settings_reach_the_planner(wall: Path) -> None:

@@ -61,7 +61,7 @@ def test_a_start_that_gets_off_the_unknown_cells_is_fenced_in() -> None:
     z = free_field(64, 64)
     z[:, 30] = BLOCKED
     z[20:25, 10:15] = UNSEEN
-    with pytest.raises(EnclosedError, match="the start is fenced in"):
+    with pytest.raises(EnclosedError, match="the start is enclosed"):
         plan(problem(grid_of(z), start=(12.5, 22.5), goal=(55.5, 30.5)))
 
 
@@ -69,7 +69,7 @@ def test_a_start_among_nonfree_cells_is_fenced_in_though_it_is_unknown() -> None
     z = free_field(64, 64)
     z[20:27, 20:27] = BLOCKED
     z[22:25, 22:25] = UNSEEN
-    with pytest.raises(EnclosedError, match="the start is fenced in"):
+    with pytest.raises(EnclosedError, match="the start is enclosed"):
         plan(problem(grid_of(z), start=(23.5, 23.5), goal=(55.5, 30.5), footprint=1.0))
 
 

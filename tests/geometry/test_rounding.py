@@ -20,7 +20,7 @@ from planners import (
     plan,
     shortcut,
 )
-from planners.audit.audit import TOLERANCE
+from planners.audit.obstacles import TOLERANCE
 from planners.geometry.rounding import rounding_at, slack_at
 
 PLACES = {"UTM": (448_000.0, 5_412_000.0, 300.0), "far": (1e8, -1e8, 1e8)}  # [m, map]

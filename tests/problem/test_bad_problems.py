@@ -76,7 +76,7 @@ def test_where_nothing_is_known_only_leave_to_guess_gives_a_route(planner: str) 
     grid.tile((0, 0))
     with pytest.raises(UnknownSpaceError, match=r"start \(9.00, 9.00\): .* unknown or contested"):
         plan(problem(grid, clear_start=False), planner)
-    with pytest.raises(UnknownSpaceError, match=r"goal \(50.00, 50.00\): .* Map that place"):
+    with pytest.raises(UnknownSpaceError, match=r"goal \(50.00, 50.00\): .* Map that area"):
         plan(problem(grid), planner)
     route = plan(problem(grid, **ALONG, unknown="allow"), planner)
     assert route.unknown_length == pytest.approx(route.length)
@@ -104,7 +104,7 @@ def test_places_are_finite_numbers(place: str, pose: Any) -> None:
 @every_planner
 @pytest.mark.parametrize("far", [1e6, 1e300])
 def test_places_far_away_are_outside(planner: str, far: float) -> None:
-    with pytest.raises(OutsideMapError, match=r"goal \(\d+\.00, \d+\.00\): outside the map"):
+    with pytest.raises(OutsideMapError, match=r"goal \(\d+\.00, \d+\.00\) is outside the map"):
         plan(problem(goal=(far, far, 0)), planner)
 
 
@@ -164,7 +164,7 @@ def test_a_setting_that_does_not_exist_is_refused(planner: str) -> None:
 def test_a_wall_all_across_encloses(planner: str) -> None:
     z = free_field(64, 64)
     z[30] = BLOCKED
-    with pytest.raises(EnclosedError, match=r"fenced in: .* however narrow the footprint\.$"):
+    with pytest.raises(EnclosedError, match=r"enclosed in .* however narrow the footprint\.$"):
         plan(problem(grid_of(z)), planner)
 
 

@@ -149,7 +149,9 @@ def test_a_corner_is_taken_with_nearly_the_radius_that_there_is_room_for() -> No
     for share in (0.3, 0.6, 0.9):
         rounded = smooth(problem, route, turning_radius=share * limit)
         assert max_curvature(rounded.waypoints) * share * limit <= 1 + 1e-9
-    with pytest.raises(SmoothingError, match=r"with a turning radius of 5\.52 m: clear") as caught:
+    with pytest.raises(
+        SmoothingError, match=r"with a turning radius of 5\.52 m: the clear"
+    ) as caught:
         smooth(problem, route, turning_radius=1.02 * limit)
     error = caught.value
     assert math.dist(error.xy, (38.5, 3.5)) < 5.0
@@ -158,7 +160,7 @@ def test_a_corner_is_taken_with_nearly_the_radius_that_there_is_room_for() -> No
 
 def test_a_corner_without_any_room_is_refused() -> None:
     problem = cornered(footprint=2.5)
-    with pytest.raises(SmoothingError, match="clearance allows none that was tried") as caught:
+    with pytest.raises(SmoothingError, match="clearance allows none of the radii tried") as caught:
         smooth(problem, plan(problem), turning_radius=10.0)
     assert caught.value.possible == 0.0
     assert math.dist(caught.value.xy, (38.5, 3.5)) < 5.0

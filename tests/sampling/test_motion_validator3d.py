@@ -18,10 +18,10 @@ from groundmap.grid.grid import ConfidenceGrid
 from planners import AuditError, PlanningProblem
 from planners.audit.audit import audit
 from planners.costmap.kernels.distance import NOWHERE
-from planners.costmap.voxel_map import Voxels, squared_distances
+from planners.costmap.voxel_map import Voxels
 from planners.geometry.rounding import SLACK
 from planners.problem.problem import Pose
-from planners.sampling.kernels.edges3d import all_squared_distances, line_clear
+from planners.sampling.kernels.edges3d import line_clear
 from planners.sampling.motion_validator3d import MotionValidator3D
 from strategies import rngs
 
@@ -104,20 +104,6 @@ def clearance(validator: MotionValidator3D, a: Pose, b: Pose) -> float:
         )
         least = min(least, math.sqrt(told.fun))
     return least
-
-
-# The field
-
-
-@given(masks())
-@settings(max_examples=60)
-def test_the_field_is_the_distance_to_the_nearest_blocked_cube(blocked: Bools) -> None:
-    found = all_squared_distances(blocked)
-    if blocked.any():
-        np.testing.assert_array_equal(found, squared_distances(blocked, ENOUGH))
-    else:
-        assert (found == NOWHERE).all()
-    np.testing.assert_array_equal(found == 0, blocked)
 
 
 # Lines

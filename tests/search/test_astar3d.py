@@ -21,7 +21,8 @@ from groundmap.grid.grid import ConfidenceGrid
 from planners import AuditError, CostSettings, PlanningProblem, ProblemError, TimeLimitError
 from planners.audit.audit import audit
 from planners.audit.boxes import segment_boxes
-from planners.costmap.voxel_map import Voxels, squared_distances
+from planners.costmap.kernels.distance import NOWHERE, squared_distances_3d
+from planners.costmap.voxel_map import Voxels
 from planners.geometry.kernels.clearance3d import cube_distance, line_clearance
 from planners.search.astar3d import AStar3D
 from planners.search.base import SearchResult, SearchSettings
@@ -93,7 +94,7 @@ def sampled_distance(a: Floats, b: Floats, lower: Floats, upper: Floats) -> floa
 # Voxels
 
 
-@given(masks(), st.integers(1, 60))
+@given(masks(), st.integers(1, 60) | st.just(NOWHERE))
 @settings(max_examples=40)
 def test_squared_distances_are_those_to_the_nearest_blocked_cube(blocked: Bools, cap: int) -> None:
     expected = np.full(blocked.shape, cap)
@@ -101,7 +102,7 @@ def test_squared_distances_are_those_to_the_nearest_blocked_cube(blocked: Bools,
         away = np.abs(np.argwhere(blocked) - at)
         halves = np.maximum(2 * away - 1, 0)
         expected[at] = min([cap, *(halves**2).sum(axis=1).tolist()])
-    np.testing.assert_array_equal(squared_distances(blocked, cap), expected)
+    np.testing.assert_array_equal(squared_distances_3d(blocked, cap), expected)
 
 
 @given(masks(), st.sampled_from(RADII))

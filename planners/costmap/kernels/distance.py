@@ -1,11 +1,11 @@
 """Exact distances from cell centres to the nearest blocked square.
 
 In half cells, a centre is at (2 col + 1, 2 row + 1) and a square spans two units, so squared
-distances are integers. The transform is separable: down a column, the nearest blocked square is k
-rows away, 2 k - 1 half cells (0 if it is the cell itself); along a row, a square to the left is
-nearest at its right border, one to the right at its left border. A column's border therefore
-carries the smaller of its two columns' squares, and what remains is the lower envelope of
-parabolas of Felzenszwalb and Huttenlocher (2012), over integers.
+distances are integers. The transform is separable. Down a column, a blocked square k rows away is
+2 k - 1 half cells away (0 for k = 0). Along a row, the nearest point of a square to the left is on
+its right border, and that of a square to the right on its left border. Each border between two
+columns therefore carries the smaller squared distance of the two, and the remaining step is the
+lower envelope of parabolas (Felzenszwalb and Huttenlocher 2012), over integers.
 """
 
 from __future__ import annotations
@@ -131,9 +131,16 @@ def _down_columns(blocked: Bools) -> Ints:
 
 @njit(cache=True, nogil=True)
 def envelope(vertical: Ints, border: Ints, at: Ints, starts: Ints) -> int:
-    """Write the lower envelope of the borders' parabolas and return how many it has.
+    """Write the lower envelope of the parabolas of the borders and return their number.
 
-    Parabola k is ``(x - at[k])² + border[k]``, the lowest from ``starts[k]`` on.
+    Parabola k is ``(x - at[k])² + border[k]``, which is the lowest from ``starts[k]`` on.
+
+    Parameters
+    ----------
+    vertical : ndarray of int64, shape (cols,)
+        Squared distances within the columns; `NOWHERE` or more for none.
+    border, at, starts : ndarray of int64, shape (cols + 1,)
+        Receive the parabolas.
     """
     cols, size = len(vertical), 0
     for b in range(cols + 1):
