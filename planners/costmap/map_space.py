@@ -31,7 +31,7 @@ LINE_CLEARANCE = {2: clearance.line_clearance, 3: clearance3d.line_clearance}
 
 @dataclass(frozen=True, eq=False)
 class MapSpace(ABC):
-    """The cells of a map as a problem sees them: a `Costmap`, or `Voxels` on a 3-D map.
+    """The cells of a map under the rules of a problem: a `Costmap`, or `Voxels` on a 3-D map.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""A 3-D map as a problem sees it: the counterpart of the costmap."""
+"""Which voxels of a 3-D map are traversable: the counterpart of the costmap."""
 
 from __future__ import annotations
 

@@ -74,8 +74,9 @@ def merge_collinear(points: Floats) -> Floats:
 
     Examples
     --------
-    >>> merge_collinear(np.array([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0], [3.0, 0.0], [4.0,
-    1.0]])).tolist() [[0.0, 0.0], [3.0, 0.0], [4.0, 1.0]]
+    >>> line = np.array([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0], [3.0, 0.0], [4.0, 1.0]])
+    >>> merge_collinear(line).tolist()
+    [[0.0, 0.0], [3.0, 0.0], [4.0, 1.0]]
     """
     differs = np.abs(np.diff(points, axis=0)).max(axis=1) >= SAME + rounding_at(points)
     # Drop inner points that repeat their predecessor, and those that the last point repeats.

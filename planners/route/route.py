@@ -1,4 +1,4 @@
-"""A collision-free path, with what it costs and how sure it is."""
+"""A collision-free path with its cost, clearance and confidence."""
 
 from __future__ import annotations
 
@@ -35,36 +35,35 @@ class Route:
     Attributes
     ----------
     waypoints : ndarray, shape (n, 2), n >= 2 [m, map]
-        Start, turning points, goal; exactly collinear points are merged. On a 3-D map of shape
-        (n, 3).
+        Start, turning points, goal; exactly collinear points are merged. Shape (n, 3) on a 3-D
+        map.
     headings : ndarray, shape (n,) [rad, map]
-        Where the robot looks at each waypoint: as the planner decided, else along the next piece
-        (at the goal: the yaw asked for, or along the last piece).
+        Heading at each waypoint: the planned one, or else along the next piece (at the goal: the
+        requested yaw, or along the last piece).
     length : float [m]
     cost : float [m]
-        What the planner minimised: the length, where the problem says so with dear metres counted
-        more, cell by cell; of sampling planners, what their weights say, along the line.
+        The quantity that the planner minimised: the length, weighted by the cost of the cells if
+        the problem has costs; the weighted objective along the line for sampling planners.
     bound : float or None
-        The cost is at most this many times the least that the planner could have found; None if
-        it knows no bound.
+        Upper bound of the ratio of the cost to the optimal cost; None if there is no bound.
     min_clearance : float [m]
-        Distance of the line to the nearest cell it must not touch (its square), exact; infinite
-        on a map without such cells.
+        Exact distance of the line to the square of the nearest cell that the footprint must not
+        touch; infinite on a map without such cells.
     known_clearance : float [m]
-        As `min_clearance`, but to the unknown cells near the start as well that count as free:
-        what is kept for sure. It is smaller where the line comes near to such cells, and 0 where
-        it crosses one.
+        As `min_clearance`, but also to the unknown cells near the start that count as free: the
+        clearance within known space. It is 0 if the line crosses such a cell.
     mean_clearance : float [m]
-        Mean along the line of the clearance at the centres of the cells it crosses.
+        Mean along the line of the clearance at the centres of the crossed cells.
     min_confidence, mean_confidence : float
-        Confidence of being free, which is minus the grid's confidence: 1 is surely free, 0 is
-        unknown. Of the least sure cell that the line crosses; mean along the line.
+        Confidence that the crossed cells are free, which is minus the grid's confidence: 1 is
+        certainly free, 0 is unknown. The smallest of a cell, and the mean along the line.
     unknown_length : float [m]
-        Length of the line in cells of which nothing is known.
+        Length of the line in cells without any observation.
     start_unknown_area : float [m²; on a 3-D map m³]
-        Area of the unknown cells that counted as free because they are near the start and that
-        the route really uses: their centre comes under the footprint, or the line crosses them.
+        Area of the unknown cells near the start that count as free and that the route uses: the
+        footprint covers their centre, or the line crosses them.
     planner : str
+        Name of the planner.
     expanded : int
         Nodes that the search expanded.
     seconds : float [s]
@@ -72,11 +71,9 @@ class Route:
     frame : str
         Frame of the waypoints.
     audit : str
-        "clean": a route that the audit refuses is never handed out; "skipped" where
-        `planners.plan_many` was told to do without.
+        "clean": the route passed the audit; "skipped" for `planners.plan_many` without audit.
     graph : planners.search.graph.Graph or None
-        The tree or roadmap that it was found in, if a sampling planner was told to keep it; files
-        leave it out.
+        The tree or roadmap of a sampling planner, if its settings keep it; not saved to files.
     """
 
     waypoints: Floats
@@ -100,14 +97,16 @@ class Route:
 
     @classmethod
     def along(cls, space: MapSpace, result: SearchResult, *, planner: str, seconds: float) -> Route:
-        """Return the route that a planner found, measured on the map.
+        """Return a search result as a route, measured on the map.
 
         Parameters
         ----------
         space : Costmap or Voxels
         result : SearchResult
-        planner, seconds
-            As in the attributes.
+        planner : str
+            Name of the planner.
+        seconds : float [s]
+            Time that planning took.
         """
         waypoints = result.waypoints
         line = cross_cells(space.to_cells(waypoints))
@@ -154,7 +153,7 @@ class Route:
         return {"type": "Feature", "geometry": geometry, "properties": properties}
 
     def to_path(self) -> dict[str, Any]:
-        """Return a dict that looks like ROS's nav_msgs/Path: poses with quaternions [map].
+        """Return a dict with the structure of ROS's nav_msgs/Path: poses with quaternions [map].
 
         Examples
         --------
@@ -174,15 +173,15 @@ class Route:
         return csv_table(self.waypoints, self.headings)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the route to a file, all or nothing; the name's ending says how.
+        """Write the route to a file, all or nothing, in the format of the suffix.
 
         ``.geojson`` or ``.json``: a GeoJSON Feature; ``.csv``: see `to_csv`; ``.yaml``: see
-        `to_path`, as ``ros2 topic pub`` takes it.
+        `to_path`, as input of ``ros2 topic pub``.
 
         Raises
         ------
         InputError
-            Another ending.
+            Another suffix.
         OSError
             The folder does not exist or can't be written to.
         """
@@ -205,7 +204,7 @@ class Route:
 
 
 def _headings(waypoints: Floats, problem: PlanningProblem) -> Floats:
-    """Return where a robot looks that drives along a line; standing, as it was asked to."""
+    """Return the headings along a line; those of start and goal for a line of length 0."""
     dx, dy = np.diff(waypoints, axis=0).T[:2]
     headings = np.arctan2(dy, dx)
     if not (dx.any() or dy.any()) and problem.start_yaw is not None:
@@ -214,14 +213,14 @@ def _headings(waypoints: Floats, problem: PlanningProblem) -> Floats:
 
 
 def _mean(values: Floats, weights: Floats) -> float:
-    """Return the weighted mean; of a single point, its value."""
+    """Return the weighted mean; the value if there is a single point."""
     if weights.sum() == 0:
         return float(values[0])
     return float(np.average(values, weights=weights))
 
 
 def _known_clearance(space: MapSpace, waypoints: Floats, clearance: float) -> float:
-    """Return the distance to what is blocked or unknown but cleared, given that to the former."""
+    """Return the distance to blocked and cleared cells, given the distance to blocked ones."""
     if not space.problem.avoids_unknown or not space.cleared.any():
         return clearance
     return min(clearance, space.clearance_of(waypoints, to=space.cleared, limit=clearance))
@@ -238,7 +237,7 @@ def _start_unknown_area(space: MapSpace, result: SearchResult, line: CrossedCell
 
 
 def _cover(space: MapSpace, result: SearchResult, places: Floats) -> Bools:
-    """Return which places come under the footprint: the outline as it is turned, or the disc."""
+    """Return which places the footprint covers: the outline at its headings, or the disc."""
     polygon = space.problem.shape.polygon
     if result.headings is None or polygon is None:
         return distances_to(places, result.waypoints) <= space.radius

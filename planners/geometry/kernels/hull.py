@@ -20,7 +20,7 @@ from groundmap.arrays import Floats, Ints
 
 @njit(cache=True, nogil=True)
 def hull_of(points: Floats) -> Floats:
-    """Return the convex hull of a few points, closed (Andrew 1979). The points are sorted in place."""
+    """Return the convex hull of a few points, closed (Andrew 1979); sorts them in place."""
     n = len(points)
     for i in range(1, n):
         x, y = points[i]
