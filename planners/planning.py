@@ -21,7 +21,7 @@ def plan(
     cancel: Cancel | None = None,
     **settings: Any,
 ) -> Route:
-    """Return a route that the audit passed, or raise an exception that says why there is none.
+    """Return an audited route, or raise an exception with the reason why there is none.
 
     Parameters
     ----------
@@ -29,25 +29,25 @@ def plan(
     planner : str, default "astar"
         A name in `PLANNERS`.
     on_improved : callable, optional
-        Called with an `Improvement` for the first route and every better one, while the search
-        goes on. If it returns True, it hears no more, and the search ends. Only "ara" and sampling
-        planners tell.
+        Called with an `Improvement` for the first route and every better one during the search.
+        If it returns True, it is not called again and the search ends. Only supported by "ara" and
+        sampling planners.
     cancel : Cancel, optional
-        Such as a `threading.Event`: once another thread sets it, the search ends, with the best
-        route so far. Only "ara" and sampling planners look at it.
+        Such as a `threading.Event`: once another thread sets it, the search ends with the best
+        route so far. Only supported by "ara" and sampling planners.
     **settings
         The planner's settings, such as `planners.AStarSettings`.
 
     Raises
     ------
     ProblemError
-        No planner of that name, or one that can neither tell nor be cancelled.
+        No planner of that name, or one that does not support an option.
     SettingsError
         An unknown setting, or one out of its range (from `groundmap.errors`).
     OutsideMapError, NonFreeError, UnknownSpaceError
-        Start or goal is no place for the footprint.
+        The footprint does not fit at the start or the goal.
     EnclosedError
-        No route joins them.
+        No route connects them.
     TimeLimitError
         Time ran out.
     CancelledError
@@ -55,7 +55,7 @@ def plan(
     UnsolvedError
         A sampling planner ended without a route.
     AuditError
-        The planner's route keeps not what was asked: a bug in the planner.
+        The route violates the requested clearance or endpoints: a bug in the planner.
 
     Examples
     --------
@@ -79,10 +79,10 @@ def plan(
 
 
 def _watch(planner: str, entry: Planner, **watch: Any) -> dict[str, Any]:
-    """Return what an anytime planner is to tell of or to look at; others have no such thing."""
+    """Return the options of the search of an anytime planner; others have none."""
     asked = {name: value for name, value in watch.items() if value is not None}
     if asked and not entry.anytime:
-        expected = "none, or an anytime planner: 'ara' or a sampling one"
+        expected = "no such option, or an anytime planner: 'ara' or a sampling planner"
         raise ProblemError(next(iter(asked)), expected, repr(planner))
     if "on_improved" in asked and not callable(asked["on_improved"]):
         raise ProblemError("on_improved", "a callable", repr(asked["on_improved"]))

@@ -37,21 +37,22 @@ class Planner(NamedTuple):
 
     engine: Callable[..., Engine]  #: makes its search engine on a `Costmap`
     settings: type[SearchSettings]  #: class of its settings
-    headings: bool = False  #: whether it heeds headings
-    anytime: bool = False  #: whether it tells of routes while it searches, and can be cancelled
+    headings: bool = False  #: whether it plans headings
+    anytime: bool = False  #: whether it reports routes during the search and can be cancelled
     engine_3d: Callable[..., Engine] | None = None  #: makes its search engine on `Voxels`
     repeatable: bool = True  #: whether it repeats a route exactly unless a time limit ends it
 
 
 class Planners(MutableMapping[str, Planner]):
-    """Planners by name: our own, and those of OMPL where it is installed.
+    """Planners by name: those of this package, and those of OMPL if it is installed.
 
-    OMPL is loaded by what can't be answered without it: a name that is not one of ours, or a list
-    of all. So neither an import of this package nor a plan with A* waits for it.
+    OMPL is only loaded for names that are not in this package and for a list of all names, so that
+    neither an import of this package nor a plan with A* waits for it.
 
     Parameters
     ----------
     own : dict
+        Planners of this package.
 
     Examples
     --------
@@ -116,7 +117,7 @@ def get_planner(planner: str) -> Planner:
     Raises
     ------
     ProblemError
-        There is none; the sentence names those there are.
+        There is none; the message lists the available names.
     """
     if not isinstance(planner, str) or planner not in PLANNERS:
         raise ProblemError(

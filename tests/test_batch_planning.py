@@ -179,7 +179,7 @@ def test_what_is_wrong_with_all_queries_is_raised() -> None:
     solid = PlanningProblem(
         ConfidenceGrid(origin=(0, 0, 0)), start=(0, 0, 0), goal=(1, 1, 1), footprint=1
     )
-    with pytest.raises(ProblemError, match="grid: expected a 2-D map, got a 3-D one"):
+    with pytest.raises(ProblemError, match="grid: expected a 2-D map, got a 3-D map"):
         plan_many(solid, [], "astar")
 
 

@@ -192,7 +192,7 @@ def test_settings_are_those_of_the_search() -> None:
 def test_a_3d_map_is_refused() -> None:
     grid = ConfidenceGrid(resolution=1.0, origin=(0.0, 0.0, 0.0))
     problem = PlanningProblem(grid, start=(0, 0, 0), goal=(1, 1, 1), footprint=0.5)
-    with pytest.raises(ProblemError, match="grid: expected a 2-D map, got one of 3-D"):
+    with pytest.raises(ProblemError, match="grid: expected a 2-D map, got a 3-D map"):
         IncrementalPlanner(problem)
 
 

@@ -48,7 +48,10 @@ def problem(grid: ConfidenceGrid = FIELD, **values: Any) -> PlanningProblem:
         ({"footprint": -0.1}, "footprint: expected a radius of 0 or more .*, got -0.1"),
         ({"footprint": math.nan}, "footprint: expected a radius of 0 or more .*, got nan"),
         ({"footprint": "wide"}, "footprint: expected a radius .*, got 'wide'"),
-        ({"footprint": [(0, 0), (1, 1), (1, 0), (0, 1)]}, r"footprint: .* meets itself at \(0.5"),
+        (
+            {"footprint": [(0, 0), (1, 1), (1, 0), (0, 1)]},
+            r"footprint: .* a self-intersection at \(0.5",
+        ),
         ({"costs": {"clearance_weight": 1}}, "costs: expected CostSettings, got {'clear"),
         ({"clear_start_radius": -1}, "clear_start_radius: expected a radius from 0 to"),
         ({"unknown": "perhaps"}, "unknown: expected 'avoid', 'allow' or 'penalise', got 'perhaps'"),

@@ -31,8 +31,8 @@ class Costmap(MapSpace):
     ----------
     problem : PlanningProblem
     window : GridWindow
-        The touched tiles, and a ring of unknown cells around them and around the cleared start:
-        the nearest of all that is unknown outside.
+        The observed tiles, surrounded by a ring of unknown cells that also encloses the cleared
+        start. The ring stands for all unknown space outside.
     blocked, nonfree, cleared : ndarray of bool, shape (rows, cols)
         Cells that the footprint may not touch; those among them that are non-free; unknown cells
         that count as free because they are near the start.

@@ -294,7 +294,7 @@ def test_the_sums_of_the_dearest_metres_are_exact(planner: str) -> None:
 def test_weights_whose_sums_would_overflow_are_refused(planner: str) -> None:
     # 1.1 million cells at 1985 each: more than the 2^31 cells that the integers hold.
     with pytest.raises(
-        ProblemError, match=r"costs: expected weights with which the 1\d+ free cells"
+        ProblemError, match=r"costs: expected a total cost of the 1\d+ traversable cells of at most"
     ):
         plan(serpentine(1499), planner)
 

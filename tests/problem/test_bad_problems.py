@@ -119,7 +119,7 @@ def test_a_footprint_larger_than_the_map_fits_nowhere(planner: str) -> None:
 @pytest.mark.parametrize(
     ("footprint", "got"),
     [
-        ([(0, 0), (1, 1), (1, 0), (0, 1)], r"one that meets itself at \(0\.5, 0\.5\)"),
+        ([(0, 0), (1, 1), (1, 0), (0, 1)], r"a self-intersection at \(0\.5, 0\.5\)"),
         ([(0, 0), (1, 0), (math.nan, 1)], "a number that is not finite"),
         ([(0, 0), (1, 0), (2, 0)], "points on one line"),
         ([], "0 different points"),

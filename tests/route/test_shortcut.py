@@ -280,7 +280,7 @@ def test_a_route_of_another_problem_is_refused() -> None:
 def test_a_route_whose_headings_were_decided_on_is_refused() -> None:
     problem, route = two_ways()
     turned = replace(route, headings=route.headings + 0.1, planner="hybrid_astar")
-    with pytest.raises(ProblemError, match=r"headings were decided on \(hybrid_astar\)"):
+    with pytest.raises(ProblemError, match=r"with planned headings \(hybrid_astar\)"):
         shortcut(problem, turned)
     looking = replace(problem, goal=(50, 20, 3.0))
     assert shortcut(looking, plan(looking)).headings[-1] == 3.0
@@ -290,7 +290,7 @@ def test_a_map_that_is_not_flat_is_refused() -> None:
     _, route = two_ways()
     grid = ConfidenceGrid(resolution=1.0, origin=(0, 0, 0))
     problem = PlanningProblem(grid, start=(5, 5, 0), goal=(50, 20, 0), footprint=1.0)
-    with pytest.raises(ProblemError, match="expected one on a 2-D map, got one on a 3-D map"):
+    with pytest.raises(ProblemError, match="grid: expected a 2-D map, got a 3-D map"):
         shortcut(problem, route)
 
 

@@ -403,7 +403,7 @@ def test_what_can_not_be_grown_is_refused() -> None:
         Roadmap.grow(problem(start=(60, 6)))
     solid = ConfidenceGrid(resolution=0.5, origin=(0, 0, 0))
     solid.fuse(np.zeros(3, dtype=np.int64), np.full((8, 8, 8), FREE, dtype=np.float32))
-    with pytest.raises(ProblemError, match="grid: expected a 2-D map, got one of 3-D"):
+    with pytest.raises(ProblemError, match="grid: expected a 2-D map, got a 3-D map"):
         Roadmap.grow(PlanningProblem(solid, start=(2, 2, 2), goal=(2, 2, 2), footprint=0.5))
 
 

@@ -216,7 +216,7 @@ def test_a_query_for_what_does_not_exist_is_refused(
 
 @pytest.mark.parametrize(
     ("footprint", "got"),
-    [("-0.1", "-0.1"), ("[[0, 0], [1, 1], [1, 0], [0, 1]]", "one that meets itself at .*")],
+    [("-0.1", "-0.1"), ("[[0, 0], [1, 1], [1, 0], [0, 1]]", "a self-intersection at .*")],
 )
 def test_a_query_with_what_is_no_footprint_is_refused(
     tmp_path: Path, footprint: str, got: str

@@ -342,7 +342,7 @@ def test_a_map_in_three_dimensions_is_refused() -> None:
     asked = PlanningProblem(
         ConfidenceGrid(origin=(0, 0, 0)), start=(1, 1, 1), goal=(2, 2, 2), footprint=0.1
     )
-    with pytest.raises(ProblemError, match="grid: expected a 2-D map, got one of 3-D"):
+    with pytest.raises(ProblemError, match="grid: expected a 2-D map, got a 3-D map"):
         widest_route(asked)
 
 
