@@ -60,7 +60,7 @@ class _Interrupts:
         raise KeyboardInterrupt
 
     def _unraisable(self, unraisable: Any) -> None:
-        """End the process if an interrupt occurs where nothing can be raised, as in a destructor."""
+        """End the process if an interrupt occurs where it can't be raised, as in a destructor."""
         if self.received and unraisable.exc_type is KeyboardInterrupt:
             self.leave()
         sys.__unraisablehook__(unraisable)

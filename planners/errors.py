@@ -87,7 +87,9 @@ x 0.00 to 48.77 m and y -9.75 to 9.75 m.
             for axis, low, high in zip("xyz", bounds[:half], bounds[half:], strict=False)
         ]
         extent = (
-            f"the tiles span {', '.join(spans[:-1])} and {spans[-1]}" if bounds else "it is empty"
+            f"the tiles span {', '.join(spans[:-1])} and {spans[-1]}"
+            if bounds
+            else "the map has none"
         )
         super().__init__(
             f"{format_place(place, xy)} is outside the map: expected a point on an observed tile; "

@@ -217,7 +217,7 @@ def test_routes_are_audited_unless_told(monkeypatch: pytest.MonkeyPatch) -> None
         assert isinstance(route, Route)
         assert route.audit == "skipped"
     assert Straight.made == ["built", "twin", "twin"]
-    with pytest.raises(AuditError, match="too near to a nonfree cell"):
+    with pytest.raises(AuditError, match="too close to a non-free cell"):
         plan_many(problem, pairs, "straight", threads=3)
 
 

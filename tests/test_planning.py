@@ -78,7 +78,7 @@ def test_an_unknown_planner_is_refused_with_what_there_is() -> None:
 @pytest.mark.parametrize("xy", [(1000, 0), (-5, 5), (64.5, -70)])
 def test_places_beyond_the_touched_tiles_are_outside(place: str, xy: tuple[float, float]) -> None:
     where = rf"{place} \({xy[0]:.2f}, {xy[1]:.2f}\)"
-    sentence = rf"{where}: outside the map: expected a place on it.*0.00 to 64.00"
+    sentence = rf"{where} is outside the map: expected a point on an observed tile.*0.00 to 64.00"
     asked: dict[str, Any] = {place: xy}
     with pytest.raises(OutsideMapError, match=sentence) as caught:
         plan(problem(**asked))
@@ -87,7 +87,7 @@ def test_places_beyond_the_touched_tiles_are_outside(place: str, xy: tuple[float
 
 
 def test_an_empty_map_has_no_inside() -> None:
-    with pytest.raises(OutsideMapError, match="which is empty"):
+    with pytest.raises(OutsideMapError, match="the map has none"):
         plan(problem(ConfidenceGrid()))
 
 
@@ -202,8 +202,10 @@ def test_the_widest_way_is_as_wide_as_the_gap(gap: int) -> None:
     assert caught.value.needed == gap + 1
 
 
-def test_a_way_that_misses_the_cell_centres_is_told_from_one_that_is_too_narrow() -> None:
-    sentence = r"is 1.00 m wide at .*, enough for .* needs, 0.90 m, but not along cell centres"
+def test_a_passage_that_misses_the_cell_centres_is_distinguished_from_a_narrow_one() -> None:
+    sentence = (
+        r"is 1.00 m wide at .*, which is enough .* \(0.90 m\), but it does not follow cell centres"
+    )
     with pytest.raises(EnclosedError, match=sentence):
         plan(into_the_pocket(gap=2, footprint=0.45))
     assert plan(into_the_pocket(gap=3, footprint=0.75)).min_clearance == 0.75

@@ -325,6 +325,6 @@ def test_the_clearance_of_few_cells_is_that_of_the_whole_map(blocked: Bools, rea
     costmap, whole = Costmap.of(asked), Costmap.of(asked).clearance
     cells = np.argwhere(~costmap.blocked)[:: 7 * reach]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("planners.costmap.costmap.FIRST_REACH", reach)
+        patch.setattr("planners.costmap.map_space.FIRST_REACH", reach)
         np.testing.assert_array_equal(costmap.clearance_at(cells), whole[tuple(cells.T)])
     assert "all_squared" not in vars(costmap)

@@ -133,7 +133,10 @@ def test_unknown_voxels_near_the_start_count_as_free() -> None:
     [
         ({"grid": ConfidenceGrid(), "start": (0, 0), "goal": (1, 1)}, "grid: expected a 3-D map"),
         ({"unknown": "penalise"}, "unknown: expected 'avoid' or 'allow' on a 3-D map"),
-        ({"costs": CostSettings(clearance_weight=1.0)}, "costs: expected none but length on a 3-D"),
+        (
+            {"costs": CostSettings(clearance_weight=1.0)},
+            "costs: expected no costs except length on a 3-D",
+        ),
         (
             {"clear_start_radius": 500.0},
             "footprint: expected one that leaves 33554432 cells of map",
