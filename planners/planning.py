@@ -80,11 +80,11 @@ def plan(
 
 def _watch(planner: str, entry: Planner, **watch: Any) -> dict[str, Any]:
     """Return the options of the search of an anytime planner; others have none."""
-    asked = {name: value for name, value in watch.items() if value is not None}
-    if asked and not entry.anytime:
+    options = {name: value for name, value in watch.items() if value is not None}
+    if options and not entry.anytime:
         expected = "no such option, or an anytime planner: 'ara' or a sampling planner"
-        raise ProblemError(next(iter(asked)), expected, repr(planner))
-    if "on_improved" in asked and not callable(asked["on_improved"]):
-        raise ProblemError("on_improved", "a callable", repr(asked["on_improved"]))
-    check_cancel(asked.get("cancel"))
-    return asked
+        raise ProblemError(next(iter(options)), expected, repr(planner))
+    if "on_improved" in options and not callable(options["on_improved"]):
+        raise ProblemError("on_improved", "a callable", repr(options["on_improved"]))
+    check_cancel(options.get("cancel"))
+    return options

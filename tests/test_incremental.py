@@ -196,7 +196,7 @@ def test_a_3d_map_is_refused() -> None:
         IncrementalPlanner(problem)
 
 
-def test_what_was_cleared_around_the_start_is_unknown_again_once_the_robot_is_elsewhere() -> None:
+def test_cells_cleared_around_the_start_are_unknown_again_after_the_robot_has_moved() -> None:
     z = free_field(SIDE, SIDE)
     z[:, 7:9] = UNSEEN
     planner = IncrementalPlanner(problem_on(z))
@@ -208,7 +208,7 @@ def test_what_was_cleared_around_the_start_is_unknown_again_once_the_robot_is_el
                 planner.plan(start=start)
 
 
-def test_a_start_on_ground_that_came_after_what_is_cleared_is_looked_at() -> None:
+def test_a_start_on_ground_added_after_the_cleared_cells_is_checked() -> None:
     grid = ConfidenceGrid(resolution=0.1)
     grid.fuse(np.array([0, 0]), free_field(64, 64))
     here = {"start": (5.9, 3.0), "goal": (3.0, 3.0), "footprint": 0.2}
@@ -222,7 +222,7 @@ def test_a_start_on_ground_that_came_after_what_is_cleared_is_looked_at() -> Non
         planner.plan(start=(10.0, 3.0))
 
 
-def test_what_only_touched_the_clear_radius_is_unknown_again_once_the_robot_is_gone() -> None:
+def test_cells_that_touched_the_clear_radius_are_unknown_again_after_the_robot_has_moved() -> None:
     z = free_field(SIDE, SIDE)
     z[5] = UNSEEN  # a band across, which the first start stands beside
     problem = PlanningProblem(grid_of(z), start=(8, 6), goal=(8.5, 2.5), footprint=0.0)

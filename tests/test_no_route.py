@@ -43,7 +43,7 @@ def failure(problem: PlanningProblem) -> EnclosedError:
     return caught.value
 
 
-def test_a_gap_that_is_too_narrow_is_named_with_its_place_and_what_is_needed() -> None:
+def test_a_narrow_gap_is_reported_with_its_place_and_the_required_width() -> None:
     error = failure(across(halves(gap=3), 0.9))
     assert (error.widest_gap, error.needed, error.bottleneck) == (1.5, 1.8, (15.5, 20.75))
     tail = (
@@ -80,7 +80,7 @@ def test_planners_of_headings_need_the_width_of_the_inscribed_disc() -> None:
         )
 
 
-def test_a_width_near_what_is_needed_is_an_estimate() -> None:
+def test_a_width_near_the_required_one_is_an_estimate() -> None:
     facts = FACTS | {"widest_gap": 1.0, "slack": 0.1}
     assert "is about 1.00 m wide; the footprint needs 1.05 m." in str(
         EnclosedError("goal", **facts, needed=1.05)
@@ -90,7 +90,7 @@ def test_a_width_near_what_is_needed_is_an_estimate() -> None:
     )
 
 
-def test_a_slanted_gap_is_wider_than_the_lattice_says_by_less_than_the_slack() -> None:
+def test_a_slanted_gap_exceeds_its_lattice_width_by_less_than_the_slack() -> None:
     z = free_field(40, 40)
     z[:18, :20] = z[20:, 23:] = BLOCKED  # corners at (20, 18) and (23, 20)
     ends: dict[str, Any] = {"start": (10.5, 30.5), "goal": (30.5, 10.5), "clear_start": False}
@@ -121,7 +121,7 @@ def test_without_a_passage_there_is_no_bottleneck() -> None:
 
 @given(rngs())
 @settings(max_examples=25, deadline=None)
-def test_the_widest_route_says_the_same_width(rng: np.random.Generator) -> None:
+def test_the_widest_route_has_the_same_width(rng: np.random.Generator) -> None:
     z = free_field(48, 48)
     for row, col in rng.integers(0, 48, (60, 2)).tolist():
         z[row : row + 4, col : col + 4] = BLOCKED

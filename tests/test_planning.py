@@ -63,12 +63,12 @@ def problem(grid: ConfidenceGrid = FIELD, **values: Any) -> PlanningProblem:
         ({"grid": "map.npz"}, "grid: expected a ConfidenceGrid, got 'map.npz'"),
     ],
 )
-def test_a_problem_that_cannot_be_posed_is_refused(values: dict[str, Any], sentence: str) -> None:
+def test_an_invalid_problem_is_refused(values: dict[str, Any], sentence: str) -> None:
     with pytest.raises(ProblemError, match=sentence):
         problem(**values)
 
 
-def test_an_unknown_planner_is_refused_with_what_there_is() -> None:
+def test_an_unknown_planner_is_refused_with_the_available_names() -> None:
     with pytest.raises(ProblemError, match=r"planner: expected one of .*ara, .*, got 'astral'"):
         plan(problem(), "astral")
     assert "astar" in PLANNERS
@@ -149,7 +149,7 @@ def test_a_footprint_over_unknown_or_contested_space_is_named(
         (BLOCKED, UNSEEN, NonFreeError, "overlaps non-free space"),
     ],
 )
-def test_the_state_of_the_place_itself_comes_before_what_is_near(
+def test_the_state_of_the_place_itself_takes_precedence(
     at_goal: float, beside: float, error: type[NoRouteError], sentence: str
 ) -> None:
     z = free_field(64, 64)
@@ -185,7 +185,7 @@ def test_an_enclosed_pocket_reports_its_area() -> None:
     assert error.distance == pytest.approx(3.5)
 
 
-def test_whoever_has_less_room_is_fenced_in() -> None:
+def test_the_end_with_less_room_is_enclosed() -> None:
     with pytest.raises(EnclosedError, match="the start is enclosed") as caught:
         plan(problem(pocket(), start=(18.25, 17.25), goal=(2.25, 2.25), footprint=0.5))
     assert caught.value.place == "start"
@@ -268,14 +268,14 @@ def beside_a_wall(yaw: float, **values: Any) -> PlanningProblem:
     return problem(grid_of(z), **(asked | values))
 
 
-def test_an_outline_is_looked_at_as_it_is_turned_by_planners_that_turn_it() -> None:
+def test_planners_of_headings_check_an_outline_at_its_yaw() -> None:
     route = plan(beside_a_wall(0.0), "hybrid_astar")
     assert route.length == pytest.approx(31.0)
     with pytest.raises(NonFreeError, match=r"start \(9.00, 10.80\): the footprint \(radius 2.57"):
         plan(beside_a_wall(0.0), "astar")
 
 
-def test_an_outline_that_does_not_fit_as_it_is_turned_is_named_with_its_yaw() -> None:
+def test_an_outline_that_does_not_fit_at_its_yaw_is_reported_with_the_yaw() -> None:
     sentence = r"start \(9.00, 10.80\): the footprint \(at yaw -1.57 rad\) overlaps non-free"
     with pytest.raises(NonFreeError, match=sentence) as caught:
         plan(beside_a_wall(-np.pi / 2), "hybrid_astar")

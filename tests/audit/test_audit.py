@@ -167,7 +167,7 @@ def placed(outline: list[tuple[float, float]], pose: Floats) -> shapely.Polygon:
 
 @given(rngs(), st.sampled_from([CAR, HOOK]), st.floats(-2.5, 2.5))
 @settings(max_examples=60)
-def test_what_an_outline_sweeps_between_two_poses_is_refused(
+def test_an_outline_that_sweeps_an_obstacle_between_two_poses_is_refused(
     rng: np.random.Generator, outline: list[tuple[float, float]], turn: float
 ) -> None:
     first = np.array([28.0, 30.0, rng.uniform(-1.5, 1.5)])

@@ -74,7 +74,7 @@ def test_a_start_among_nonfree_cells_is_fenced_in_though_it_is_unknown() -> None
 
 
 def test_the_nearest_place_is_one_that_the_other_end_can_be_reached_from() -> None:
-    # The nearest free place to the pillar's middle is in the room that nobody gets into.
+    # The nearest free place to the pillar's middle is in the inaccessible room.
     with pytest.raises(NonFreeError, match="goal") as caught:
         plan(problem(pocketed(), start=(50, 50), goal=(20.5, 22.5)))
     assert caught.value.nearest is not None

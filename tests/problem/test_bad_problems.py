@@ -130,13 +130,13 @@ def test_a_footprint_larger_than_the_map_fits_nowhere(planner: str) -> None:
         (None, r".*"),
     ],
 )
-def test_what_is_no_footprint_is_refused(footprint: Any, got: str) -> None:
+def test_invalid_footprints_are_refused(footprint: Any, got: str) -> None:
     with pytest.raises(ProblemError, match=f"footprint: expected a radius of 0 or .*, got {got}"):
         problem(footprint=footprint)
 
 
 @pytest.mark.parametrize("name", sorted(CostSettings.model_fields))
-@pytest.mark.parametrize("value", [-1.0, -1e-9, math.nan, math.inf, "dear"])
+@pytest.mark.parametrize("value", [-1.0, -1e-9, math.nan, math.inf, "expensive"])
 def test_costs_are_numbers_of_zero_or_more(name: str, value: Any) -> None:
     with pytest.raises(SettingsError, match=rf"{name}: expected .*, got {value!r}"):
         CostSettings(**{name: value})
@@ -216,7 +216,7 @@ def test_in_a_corridor_of_a_million_cells_all_planners_end_in_time(
 
 
 @every_planner
-def test_a_winding_corridor_one_cell_wide_is_driven_by_who_can_turn_on_the_spot(
+def test_planners_that_turn_on_the_spot_drive_a_winding_corridor_one_cell_wide(
     planner: str,
 ) -> None:
     grid = grid_of(serpentine(127, 128))
@@ -229,9 +229,9 @@ def test_a_winding_corridor_one_cell_wide_is_driven_by_who_can_turn_on_the_spot(
 
 
 @pytest.mark.parametrize("planner", ["astar", "ara", "dijkstra", "dstar_lite"])
-def test_dear_metres_make_no_way_from_a_place_to_itself(planner: str) -> None:
-    dear = CostSettings(confidence_weight=1.0)
-    route = plan(problem(start=(9, 9), goal=(9, 9), costs=dear), planner)
+def test_costs_do_not_lengthen_the_route_from_a_place_to_itself(planner: str) -> None:
+    expensive = CostSettings(confidence_weight=1.0)
+    route = plan(problem(start=(9, 9), goal=(9, 9), costs=expensive), planner)
     assert (route.length, route.cost) == (0.0, 0.0)
 
 
@@ -243,12 +243,12 @@ def test_dear_metres_make_no_way_from_a_place_to_itself(planner: str) -> None:
         ({"epsilon": None}, "epsilon"),
     ],
 )
-def test_what_is_no_number_is_refused_by_name(values: dict[str, Any], name: str) -> None:
+def test_values_that_are_not_numbers_are_refused_by_name(values: dict[str, Any], name: str) -> None:
     with pytest.raises(ProblemError, match=rf"^{name}: expected"):
         problem(**values)
 
 
-def test_an_outline_without_a_yaw_is_asked_for_one() -> None:
+def test_an_outline_without_a_yaw_is_refused() -> None:
     z = np.full((64, 64), BLOCKED)
     z[30:34] = FREE  # wide enough for the outline, not for the disc around it
     car = [(-2.0, -1.0), (6.0, -1.0), (6.0, 1.0), (-2.0, 1.0)]
