@@ -1,8 +1,8 @@
-"""From A to B on a confidence grid: routes, or reasons why there is none.
+"""Planning on a confidence grid: collision-free routes, or the reason why there is none.
 
-The names are those of `planners.public`, which is loaded when the first is asked for: the command
-line handles Ctrl-C before that, as loading takes a second. No module of the package may be called
-like one of them, since Python would then show the module instead.
+The public names are those of `planners.public`, which is loaded on the first access to one of them,
+because loading takes a second and the command line handles Ctrl-C before. No module of the package
+may have one of these names, since Python would then return the module instead.
 """
 
 from importlib import import_module
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> Any:
-    if name.startswith("_") and name != "__all__":  # what Python and its tools look for
+    if name.startswith("_") and name != "__all__":  # looked up by Python and its tools
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     public = import_module("planners.public")
     if name != "__all__" and name not in public.__all__:

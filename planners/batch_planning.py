@@ -1,4 +1,4 @@
-"""Many queries on one map: what they share is worked out once, and threads answer them."""
+"""Many queries on one map, answered by threads that share the costmap."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from planners.errors import NoRouteError, ProblemError
 from planners.problem.problem import PlanningProblem
 from planners.registry import Planner, get_planner
 from planners.route.route import Route
-from planners.route.solve import solve, with_problem
+from planners.route.solve import solve
 from planners.search.base import Engine, SearchSettings, now
 
 Pair: TypeAlias = Sequence[Sequence[float] | Floats] | Floats  #: a start and a goal
 
 
-class _Desk(NamedTuple):
-    """What answers queries, one at a time in each thread."""
+class _Workspace(NamedTuple):
+    """The costmap and engines that answer queries, one query at a time in each thread."""
 
     costmap: Costmap
     engines: SimpleQueue[Engine]
@@ -45,41 +45,40 @@ def plan_many(
     audit: bool = True,
     **settings: Any,
 ) -> list[Route | NoRouteError]:
-    """Return for each start and goal what `plan` would return, or the exception it would raise.
+    """Return for each start and goal the route of `plan`, or the exception that it would raise.
 
-    Costmap and engines are made once; the searches of different threads run at the same time.
+    The costmap and the engines are created once; threads search in parallel.
 
     Parameters
     ----------
     problem : PlanningProblem
-        Says all but the starts and goals. With ``clear_start``, the unknown cells near *its* start
-        count as free, for every query, and no others (as with ``cleared_at`` at that place).
+        Everything except the starts and goals. With ``clear_start``, the unknown cells near *its*
+        start count as free for every query, and no others (as with ``cleared_at`` at that place).
     pairs : iterable of (start, goal)
         Each x, y [m, map] and optionally yaw [rad].
     planner : str, default "auto"
         A name in `PLANNERS`.
     threads : int, optional
-        As many as the machine has processors unless told. The routes don't depend on it.
+        Number of threads; default: the number of processors. The routes do not depend on it.
     audit : bool, default True
-        Whether every route is audited, as those of `plan` are. On maps of 512 x 512 cells this
-        takes about half as long as all the rest; an unaudited route's `audit` is "skipped".
+        Whether every route is audited, as by `plan`. The `audit` of other routes is "skipped".
     **settings
-        The planner's settings; a time limit is for each query.
+        The planner's settings; a time limit applies to each query.
 
     Returns
     -------
     list of Route or NoRouteError
-        In the order of the pairs. Only what is wrong with one query is in the list; what is
-        wrong with all of them is raised.
+        In the order of the pairs. Failures of a single query are in the list; errors that concern
+        all queries are raised.
 
     Raises
     ------
     ProblemError
-        No planner of that name, or a pair that is not two places: its number is in the sentence.
+        No planner of that name, or an invalid pair, whose index is in the message.
     SettingsError
         An unknown setting, or one out of its range (from `groundmap.errors`).
     AuditError
-        A planner's route keeps not what was asked: a bug in the planner.
+        A route violates the requested clearance or endpoints: a bug in the planner.
 
     Examples
     --------
@@ -100,35 +99,32 @@ def plan_many(
     chosen = get_planner(planner)
     options = chosen.settings(**settings)
     headings = chosen.headings and options.heeds_headings(problem)
-    turned = (("start",) if options.takes_other_goals else ("start", "goal")) if headings else ()
-    problems = _problems(problem, pairs, turned=turned)
+    posed = (("start",) if options.takes_other_goals else ("start", "goal")) if headings else ()
+    problems = _problems(problem, pairs, posed=posed)
     workers = min(_threads(threads), max(len(problems), 1))
     if not problems:
         return []
     costmap = Costmap.of(problems[0])
-    for name in ("moves", "steps", "clearance"):  # worked out by one thread, not by each
+    for name in ("moves", "steps", "clearance"):  # computed once, not by each thread
         getattr(costmap, name)
     stop = threading.Event()
     watch = {"cancel": stop} if chosen.anytime else {}
     engines = _engines(chosen, costmap, workers)
-    desk = _Desk(costmap, engines, options, chosen.headings, audit, watch)
+    workspace = _Workspace(costmap, engines, options, chosen.headings, audit, watch)
     with ThreadPoolExecutor(workers) as pool:
         try:
-            return list(pool.map(lambda asked: _answer(desk, asked), problems))
-        except BaseException:  # such as Ctrl-C, which would wait for all that run or wait
+            return list(pool.map(lambda query: _answer(workspace, query), problems))
+        except BaseException:  # such as Ctrl-C, which would otherwise wait for all queries
             stop.set()
             pool.shutdown(wait=False, cancel_futures=True)
             raise
 
 
 def _problems(
-    problem: PlanningProblem, pairs: Iterable[Pair], *, turned: tuple[str, ...]
+    problem: PlanningProblem, pairs: Iterable[Pair], *, posed: tuple[str, ...]
 ) -> list[PlanningProblem]:
-    """Return a problem for each pair, some of whose places need a yaw; they clear the same."""
-    if problem.grid.ndim != 2:
-        raise ProblemError(
-            "grid", "a 2-D map", f"a {problem.grid.ndim}-D one", hint="Use `plan` for each pair."
-        )
+    """Return a problem for each pair, whose `posed` places need a yaw; all clear the same cells."""
+    problem.check_dimensions(2, hint="Use `plan` for each pair.")
     if not isinstance(pairs, Iterable) or (isinstance(pairs, np.ndarray) and pairs.ndim == 0):
         raise ProblemError("pairs", "pairs of a start and a goal", repr(pairs))
     problems = []
@@ -138,26 +134,26 @@ def _problems(
         except (TypeError, ValueError) as error:
             raise ProblemError(f"pairs[{i}]", "a start and a goal", repr(pair)) from error
         try:
-            asked = replace(problem, start=start, goal=goal, cleared_at=problem.clear_place)
+            query = replace(problem, start=start, goal=goal, cleared_at=problem.clear_place)
         except ProblemError as error:
             raise ProblemError(f"pairs[{i}], {error.name}", error.expected, error.got) from error
-        if any(len(getattr(asked, place)) == 2 for place in turned):
-            expected = f"a {' and a '.join(turned)} with yaws [rad]"
+        if any(len(getattr(query, place)) == 2 for place in posed):
+            expected = f"a {' and a '.join(posed)} with yaws [rad]"
             raise ProblemError(f"pairs[{i}]", expected, repr(pair))
-        problems.append(asked)
+        problems.append(query)
     return problems
 
 
 def _threads(threads: int | None) -> int:
-    if threads is None:  # Python 3.13 knows how many of them this process may use
+    if threads is None:  # Python 3.13 counts those that this process may use
         return getattr(os, "process_cpu_count", os.cpu_count)() or 1
     if not isinstance(threads, int) or isinstance(threads, bool) or threads < 1:
-        raise ProblemError("threads", "a whole number of 1 or more", repr(threads))
+        raise ProblemError("threads", "an integer of 1 or more", repr(threads))
     return threads
 
 
 def _engines(planner: Planner, costmap: Costmap, count: int) -> SimpleQueue[Engine]:
-    """Return engines; those that can make a twin of themselves share what they worked out."""
+    """Return engines; those with a `twin` method share their tables."""
     first = planner.engine(costmap)
     twin = getattr(first, "twin", None) or (lambda: planner.engine(costmap))
     engines: SimpleQueue[Engine] = SimpleQueue()
@@ -167,25 +163,25 @@ def _engines(planner: Planner, costmap: Costmap, count: int) -> SimpleQueue[Engi
     return engines
 
 
-def _answer(desk: _Desk, problem: PlanningProblem) -> Route | NoRouteError:
-    engine = desk.engines.get()
+def _answer(workspace: _Workspace, problem: PlanningProblem) -> Route | NoRouteError:
+    engine = workspace.engines.get()
     try:
-        return _route(desk, engine, problem)
+        return _route(workspace, engine, problem)
     except NoRouteError as error:
-        return error.with_traceback(None)  # which would keep the engine's arrays alive
+        return error.with_traceback(None)  # a traceback would keep the engine's arrays alive
     finally:
-        desk.engines.put(engine)
+        workspace.engines.put(engine)
 
 
-def _route(desk: _Desk, engine: Engine, problem: PlanningProblem) -> Route:
+def _route(workspace: _Workspace, engine: Engine, problem: PlanningProblem) -> Route:
     began = now()
-    check_on_map(problem, goal=not desk.settings.takes_other_goals)
+    check_on_map(problem, goal=not workspace.settings.takes_other_goals)
     return solve(
-        with_problem(desk.costmap, problem),
+        workspace.costmap.with_problem(problem),
         engine,
-        desk.settings,
+        workspace.settings,
         began=began,
-        headings=desk.headings and desk.settings.heeds_headings(problem),
-        audited=desk.audited,
-        watch=desk.watch,
+        headings=workspace.headings and workspace.settings.heeds_headings(problem),
+        audited=workspace.audited,
+        watch=workspace.watch,
     )

@@ -1,7 +1,7 @@
 """The command ``groundmap``: exit 0 done, 1 a bound missed, 2 bad input or usage, 3 no route.
 
-130 and 143 after SIGINT (Ctrl-C) and SIGTERM: one line on stderr, at any time, and no process is
-left behind. What takes time to load is loaded after their handlers are set.
+The exit code is 130 after SIGINT (Ctrl-C) and 143 after SIGTERM, with one line on stderr, at any
+time, and no child process is left running. Slow imports are made after their handlers are set.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 
 
 class _Interrupts:
-    """What happens on SIGINT and SIGTERM.
+    """Handlers of SIGINT and SIGTERM.
 
-    While a command runs, the first raises KeyboardInterrupt, so that files which are half written
-    are removed. Before and after, and at the second, the process ends at once.
+    While a command runs, the first signal raises KeyboardInterrupt, so that incomplete files are
+    removed. The second signal, and any signal before or after the command, ends the process.
     """
 
     def __init__(self) -> None:
@@ -30,7 +30,7 @@ class _Interrupts:
         self._before: dict[int, Any] = {}
 
     def set_handlers(self) -> None:
-        """Handle the signals, but for those that the caller wants ignored (as nohup does)."""
+        """Handle the signals, except those that the parent process ignores (such as nohup)."""
         if threading.current_thread() is not threading.main_thread():
             return
         for number in WORDS:
@@ -39,13 +39,13 @@ class _Interrupts:
         sys.unraisablehook = self._unraisable
 
     def restore_handlers(self) -> None:
-        """Have the signals handled as before."""
+        """Restore the previous handlers."""
         for number, handler in self._before.items():
             signal.signal(number, handler)
         sys.unraisablehook = sys.__unraisablehook__
 
     def leave(self) -> None:
-        """End the process and those that it started, with a line on stderr."""
+        """End the process and its child processes, with a line on stderr."""
         if "multiprocessing" in sys.modules:
             for child in sys.modules["multiprocessing"].active_children():
                 child.kill()
@@ -60,7 +60,7 @@ class _Interrupts:
         raise KeyboardInterrupt
 
     def _unraisable(self, unraisable: Any) -> None:
-        """Leave where an interrupt is raised in what can't raise, such as a destructor."""
+        """End the process if an interrupt occurs where it can't be raised, as in a destructor."""
         if self.received and unraisable.exc_type is KeyboardInterrupt:
             self.leave()
         sys.__unraisablehook__(unraisable)
@@ -72,8 +72,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Parameters
     ----------
     arguments : sequence of str, optional
-        The process's own unless given. With arguments, the signals are handled as before once
-        the command has ended.
+        Default: those of the process. With arguments, the previous signal handlers are restored
+        after the command.
     """
     interrupts = _Interrupts()
     interrupts.set_handlers()
@@ -96,6 +96,6 @@ def _run(interrupts: _Interrupts, argv: Sequence[str]) -> int:
         raise
     finally:
         interrupts.running = False
-        # Whatever came out of the command then: libraries turn interrupts into other exceptions.
+        # Also after other exceptions, as libraries convert interrupts to them.
         if interrupts.received:
             interrupts.leave()

@@ -1,4 +1,4 @@
-"""The words of the exceptions: places, footprints, widths."""
+"""Parts of error messages: positions, footprints, passages."""
 
 from __future__ import annotations
 
@@ -6,44 +6,65 @@ import math
 from typing import Literal, TypeAlias
 
 Place: TypeAlias = Literal["start", "goal"]
-Turning: TypeAlias = Literal["none", "anyhow", "heeded"]
+Turning: TypeAlias = Literal["none", "any", "planned"]
 Point: TypeAlias = tuple[float, ...]  #: x, y (on a 3-D map also z) [m, map]
-MOST_DECIMALS = 9  # of a width [m]: what is nearer is the same, up to rounding
+MOST_DECIMALS = 9  # of a width [m]; smaller differences are rounding errors
 
 
 def widest_clause(
     widest: float, needed: float, at: Point | None, turning: Turning, *, slack: float
 ) -> str:
-    """Return how wide the widest way is and what that means; nothing if it was not measured."""
+    """Return a sentence that compares the widest passage with the footprint; "" if unmeasured.
+
+    Parameters
+    ----------
+    widest : float [m]
+        Width of the widest passage; 0 if there is none, NaN if it was not measured.
+    needed : float [m]
+        Width of the footprint.
+    at : tuple of float, optional [m, map]
+        Where the passage is narrowest.
+    turning : {"none", "any", "planned"}
+        What `needed` is the width of, see `planners.errors.EnclosedError`.
+    slack : float [m]
+        A passage off the lattice may be wider by up to this.
+    """
     if math.isnan(widest):
         return ""
     if widest == 0:
-        return "no way from start to goal exists, however narrow the footprint."
+        return " No passage connects start and goal, however narrow the footprint."
     has, needs = _apart(widest, needed)
-    # The width is that along a lattice: near what is needed, a slanted way may be wide enough.
+    # The width is that along a lattice: a slanted passage may be wide enough if it nearly is.
     about = "about " if widest < needed <= widest + slack else ""
-    way = f"the widest way is {about}{has} m wide{'' if at is None else f' at {format_point(at)}'}"
-    footprint = "your footprint, turned anyhow," if turning == "anyhow" else "your footprint"
-    at_least = " at least" if turning == "heeded" else ""
+    where = "" if at is None else f" at {format_point(at)}"
+    passage = f" The widest passage is {about}{has} m wide{where}"
     if widest < needed:
-        return f"{way}, {footprint} needs {needs} m{at_least}."
+        least = "at least " if turning == "planned" else ""
+        heading = " to fit at any heading" if turning == "any" else ""
+        return f"{passage}; the footprint needs {least}{needs} m{heading}."
     return (
-        f"{way}, enough for what {footprint} needs, {needs} m, but not along cell centres: "
-        "map with smaller cells, or plan with 'hybrid_astar'."
+        f"{passage}, which is enough for the footprint ({needs} m), but it does not follow cell "
+        "centres. Use a map with smaller cells, or plan with 'hybrid_astar'."
     )
 
 
 def _apart(a: float, b: float) -> tuple[str, str]:
-    """Return two numbers with as many decimals as tell them apart, mostly two."""
+    """Return two numbers with as many decimals as distinguish them, at least two."""
     for decimals in range(2, MOST_DECIMALS + 1):
-        format_point = f"{a:.{decimals}f}", f"{b:.{decimals}f}"
-        if format_point[0] != format_point[1]:
-            return format_point
+        texts = f"{a:.{decimals}f}", f"{b:.{decimals}f}"
+        if texts[0] != texts[1]:
+            return texts
     return f"{a:.2f}", f"{b:.2f}"
 
 
 def format_place(place: Place, xy: Point) -> str:
-    """Return a place with its name, such as ``goal (1.00, 2.00)``."""
+    """Return a position with its name, such as ``goal (1.00, 2.00)``.
+
+    Parameters
+    ----------
+    place : {"start", "goal"}
+    xy : tuple of float [m, map]
+    """
     return f"{place} {format_point(xy)}"
 
 
@@ -53,20 +74,30 @@ def format_point(xy: Point) -> str:
 
 
 def footprint_clause(radius: float, yaw: float | None) -> str:
-    """Return which footprint is meant: the disc, or the outline as it is turned."""
-    if yaw is None:
-        return f"the footprint (radius {radius:.2f} m)"
-    return f"the footprint, turned by {yaw:.2f} rad,"
+    """Return which footprint was checked: the disc, or the outline at a heading.
+
+    Parameters
+    ----------
+    radius : float [m]
+    yaw : float or None [rad]
+    """
+    return f"the footprint ({f'radius {radius:.2f} m' if yaw is None else f'at yaw {yaw:.2f} rad'})"
 
 
 def left_clause(left: float | None) -> str:
-    """Return how much of the way is left; nothing if that is not known."""
-    return "" if left is None else f", {left:.2f} m left to the goal"
+    """Return the remaining distance to the goal [m] as a clause; "" if it is unknown."""
+    return "" if left is None else f", {left:.2f} m from the goal"
 
 
 def nearest_clause(xy: Point, nearest: Point | None) -> str:
-    """Return a sentence on where to go instead; nothing if there is nowhere."""
+    """Return a sentence on the nearest position that fits; "" if there is none.
+
+    Parameters
+    ----------
+    xy : tuple of float [m, map]
+    nearest : tuple of float or None [m, map]
+    """
     if nearest is None:
         return ""
-    away = math.dist(xy, nearest)
-    return f" The nearest place for it is {format_point(nearest)}, {away:.2f} m away."
+    fit, away = format_point(nearest), math.dist(xy, nearest)
+    return f" The nearest position where the footprint fits is {fit}, {away:.2f} m away."

@@ -1,22 +1,22 @@
-"""Everything that planners raises on purpose.
+"""Exceptions of `planners`.
 
 ::
 
     PlanningError
-    ├── ProblemError (ValueError)    a problem that can't be posed: NaN, a negative footprint, ...
-    ├── NoRouteError                 a well-posed problem without a route
-    │   ├── OutsideMapError          start or goal lies beyond the map
+    ├── ProblemError (ValueError)    an invalid problem: NaN, a negative footprint, ...
+    ├── NoRouteError                 a valid problem without a route
+    │   ├── OutsideMapError          start or goal lies outside the map
     │   ├── NonFreeError             the footprint overlaps non-free space there
     │   ├── UnknownSpaceError        the footprint overlaps unknown or contested space there
-    │   ├── EnclosedError            start or goal is fenced in
-    │   ├── SmoothingError           clearance allows no turns as wide as asked for
+    │   ├── EnclosedError            start and goal are not connected
+    │   ├── SmoothingError           the clearance does not allow the turning radius
     │   ├── TimeLimitError           time ran out before the search ended
-    │   ├── CancelledError           the search was cancelled before there was a route
+    │   ├── CancelledError           the search was cancelled before it found a route
     │   └── UnsolvedError            a sampling planner ended without a route
-    └── AuditError                   a planner's route that keeps not what was asked: a bug
+    └── AuditError                   a route that violates the problem: a bug in the planner
 
-The exceptions take facts, keep them as attributes, and compose one sentence from them. Settings
-that don't exist or are out of range raise `groundmap.errors.SettingsError`, as everywhere.
+The exceptions take facts, keep them as attributes, and compose the message from them. Unknown
+settings and settings out of range raise `groundmap.errors.SettingsError`.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class PlanningError(FactualError):
 
 
 class ProblemError(PlanningError, WrongValueError):
-    """A problem that can't be posed.
+    """An invalid problem.
 
     Examples
     --------
@@ -50,17 +50,26 @@ class ProblemError(PlanningError, WrongValueError):
 
 
 class NoRouteError(PlanningError):
-    """A well-posed problem without a route; the subclasses say why."""
+    """A valid problem without a route; the subclass is the reason."""
 
 
 class OutsideMapError(NoRouteError):
-    """Start or goal lies beyond the map.
+    """Start or goal lies outside the map.
+
+    Parameters
+    ----------
+    place : {"start", "goal"}
+    xy : tuple of float [m, map]
+    bounds : tuple of float [m, map]
+        Bounding box of the observed tiles, lower then upper corner; empty for an empty map.
+    nearest : tuple of float, optional [m, map]
+        Nearest position where the footprint fits.
 
     Examples
     --------
     >>> print(OutsideMapError("goal", (90.0, 4.0), bounds=(0.0, -9.75, 48.77, 9.75)))
-    goal (90.00, 4.00): outside the map: expected a place on it, which spans x 0.00 to 48.77 m and \
-y -9.75 to 9.75 m (box around the touched tiles); nothing was ever seen near it.
+    goal (90.00, 4.00) is outside the map: expected a point on an observed tile; the tiles span \
+x 0.00 to 48.77 m and y -9.75 to 9.75 m.
     """
 
     def __init__(
@@ -78,24 +87,37 @@ y -9.75 to 9.75 m (box around the touched tiles); nothing was ever seen near it.
             for axis, low, high in zip("xyz", bounds[:half], bounds[half:], strict=False)
         ]
         extent = (
-            f"which spans {', '.join(spans[:-1])} and {spans[-1]} (box around the touched tiles)"
+            f"the tiles span {', '.join(spans[:-1])} and {spans[-1]}"
             if bounds
-            else "which is empty"
+            else "the map has none"
         )
         super().__init__(
-            f"{format_place(place, xy)}: outside the map: expected a place on it, {extent}; "
-            f"nothing was ever seen near it.{nearest_clause(xy, nearest)}"
+            f"{format_place(place, xy)} is outside the map: expected a point on an observed tile; "
+            f"{extent}.{nearest_clause(xy, nearest)}"
         )
 
 
 class NonFreeError(NoRouteError):
     """The footprint overlaps non-free space at the start or the goal.
 
+    Parameters
+    ----------
+    place : {"start", "goal"}
+    xy : tuple of float [m, map]
+    clearance : float [m]
+        Distance from there to the nearest non-free cell.
+    needed : float [m]
+        Radius of the footprint.
+    nearest : tuple of float, optional [m, map]
+        Nearest position where the footprint fits.
+    yaw : float, optional [rad]
+        Heading of a polygon footprint, if the planner plans headings.
+
     Examples
     --------
     >>> print(NonFreeError("goal", (12.3, 4.1), clearance=0.42, needed=0.9, nearest=(12.3, 4.7)))
-    goal (12.30, 4.10): the footprint (radius 0.90 m) overlaps non-free space; clearance there is \
-0.42 m. The nearest place for it is (12.30, 4.70), 0.60 m away.
+    goal (12.30, 4.10): the footprint (radius 0.90 m) overlaps non-free space; the clearance there \
+is 0.42 m. The nearest position where the footprint fits is (12.30, 4.70), 0.60 m away.
     """
 
     def __init__(
@@ -112,18 +134,31 @@ class NonFreeError(NoRouteError):
         self.nearest, self.yaw = nearest, yaw
         super().__init__(
             f"{format_place(place, xy)}: {footprint_clause(needed, yaw)} overlaps non-free space; "
-            f"clearance there is {clearance:.2f} m.{nearest_clause(xy, nearest)}"
+            f"the clearance there is {clearance:.2f} m.{nearest_clause(xy, nearest)}"
         )
 
 
 class UnknownSpaceError(NoRouteError):
     """The footprint overlaps unknown or contested space at the start or the goal.
 
+    Parameters
+    ----------
+    place : {"start", "goal"}
+    xy : tuple of float [m, map]
+    clearance : float [m]
+        Distance from there to the nearest unknown or contested cell.
+    needed : float [m]
+        Radius of the footprint.
+    nearest : tuple of float, optional [m, map]
+        Nearest position where the footprint fits.
+    yaw : float, optional [rad]
+        Heading of a polygon footprint, if the planner plans headings.
+
     Examples
     --------
     >>> print(UnknownSpaceError("start", (0.0, 0.0), clearance=0.25, needed=0.9))
     start (0.00, 0.00): the footprint (radius 0.90 m) overlaps unknown or contested space, which \
-begins 0.25 m away. Map that place, or plan with unknown='allow' (--unknown allow).
+begins 0.25 m away. Map that area, or plan with unknown='allow' (--unknown allow).
     """
 
     def __init__(
@@ -141,45 +176,45 @@ begins 0.25 m away. Map that place, or plan with unknown='allow' (--unknown allo
         super().__init__(
             f"{format_place(place, xy)}: {footprint_clause(needed, yaw)} overlaps unknown or "
             f"contested space, which begins {clearance:.2f} m away. "
-            "Map that place, or plan with unknown='allow' (--unknown allow)."
+            "Map that area, or plan with unknown='allow' (--unknown allow)."
             f"{nearest_clause(xy, nearest)}"
         )
 
 
 class EnclosedError(NoRouteError):
-    """Start or goal is fenced in.
+    """Start and goal are not connected: one of them is enclosed.
 
     Parameters
     ----------
     place : {"start", "goal"}
-        Which of the two is fenced in: the one whose reachable area is smaller.
+        The enclosed one: its reachable area is the smaller one.
     area : float [m²; m³ on 3-D maps]
         Area of the cells whose centres the footprint's centre can reach from there.
     nearest : tuple of float [m, map]
-        Of the places that can be reached from the start, the one nearest to the goal.
+        The position reachable from the start that is nearest to the goal.
     distance : float [m]
         From there to the goal.
     widest_gap : float [m]
-        Width of the widest way from start to goal, on the half-cell lattice; 0 if there is none.
-        Not smaller than `needed` where the way only misses the cell centres. NaN on 3-D maps,
+        Width of the widest passage from start to goal on the half-cell lattice; 0 if there is
+        none. It may exceed `needed` where the passage misses the cell centres. NaN on 3-D maps,
         where it is not measured.
     needed : float [m]
         Width of the footprint.
     bottleneck : tuple of float, optional [m, map]
-        Where the widest way is narrowest; None if there is none.
+        Where the widest passage is narrowest; None if there is no passage.
     slack : float, default 0 [m]
-        A way off the lattice may be wider by up to this.
-    turning : {"none", "anyhow", "heeded"}
-        What `needed` is the width of: a disc; the disc that holds an outline however it is
-        turned; the disc within an outline, of planners that heed headings.
+        A passage off the lattice may be wider by up to this.
+    turning : {"none", "any", "planned"}
+        What `needed` is the width of: a disc; the disc that holds an outline at any heading; the
+        disc within an outline, for planners that plan headings.
 
     Examples
     --------
     >>> print(EnclosedError("goal", area=12.3, nearest=(7.5, 2.0), distance=3.25,
     ...                     widest_gap=0.52, needed=0.6, bottleneck=(12.3, 4.1)))
-    no route: the goal is fenced in: an enclosed area of 12.3 m² around it; the reachable cell \
-nearest to the goal is (7.50, 2.00), 3.25 m away; the widest way is 0.52 m wide at (12.30, 4.10), \
-your footprint needs 0.60 m.
+    no route: the goal is enclosed in an area of 12.3 m²; the reachable cell nearest to the goal \
+is (7.50, 2.00), 3.25 m away. The widest passage is 0.52 m wide at (12.30, 4.10); the footprint \
+needs 0.60 m.
     """
 
     def __init__(
@@ -198,47 +233,46 @@ your footprint needs 0.60 m.
         self.place, self.area, self.nearest, self.distance = place, area, nearest, distance
         self.widest_gap, self.needed, self.bottleneck = widest_gap, needed, bottleneck
         self.turning, self.slack = turning, slack
-        if turning == "heeded" and (widest_gap + slack >= needed or needed == 0):
+        if turning == "planned" and (widest_gap + slack >= needed or needed == 0):
             super().__init__(
-                "no route that can be driven was found, looking at one pose for each cell and "
-                "heading: turn in smaller circles, leave it more room, or map with smaller cells."
+                "no route: a search over one pose per cell and heading found no drivable motion. "
+                "Use a smaller turning radius, a smaller footprint, or a map with smaller cells."
             )
             return
-        what = f"area of {area:.1f} m²" if len(nearest) == 2 else f"space of {area:.1f} m³"
-        way = widest_clause(widest_gap, needed, bottleneck, turning, slack=slack)
+        extent = f"an area of {area:.1f} m²" if len(nearest) == 2 else f"a space of {area:.1f} m³"
+        passage = widest_clause(widest_gap, needed, bottleneck, turning, slack=slack)
         super().__init__(
-            f"no route: the {place} is fenced in: an enclosed {what} around it; the reachable "
-            f"cell nearest to the goal is {format_point(nearest)}, {distance:.2f} m away"
-            f"{'; ' if way else '.'}{way}"
+            f"no route: the {place} is enclosed in {extent}; the reachable cell nearest to the "
+            f"goal is {format_point(nearest)}, {distance:.2f} m away.{passage}"
         )
 
 
 class SmoothingError(NoRouteError):
-    """There is a route, but none was found along it that turns as wide as was asked for.
+    """A route could not be rounded with the requested turning radius.
 
     Parameters
     ----------
     xy : tuple of float [m, map]
-        Where the line bends too much, or comes too near to what it must not touch.
+        Where the line bends too much or comes too close to an obstacle.
     turning_radius : float [m]
-        What was asked for.
+        The requested one.
     possible : float [m]
-        The largest turning radius found to be possible along all of the line; 0 if none was.
+        The largest turning radius found for the whole line; 0 if none was found.
 
     Examples
     --------
     >>> print(SmoothingError((3.0, 1.5), turning_radius=1.5, possible=0.8))
-    smooth: the bend at (3.00, 1.50) can't be rounded with a turning radius of 1.50 m: clearance \
-allows about 0.80 m. Ask for less, or for a planner that plans with turns.
+    smooth: the bend at (3.00, 1.50) can't be rounded with a turning radius of 1.50 m: the \
+clearance allows about 0.80 m. Use a smaller turning radius, or a planner that plans curves.
     """
 
     def __init__(self, xy: Point, *, turning_radius: float, possible: float) -> None:
         self.xy, self.turning_radius, self.possible = xy, turning_radius, possible
-        allows = f"about {possible:.2f} m" if possible > 0 else "none that was tried"
+        allows = f"about {possible:.2f} m" if possible > 0 else "none of the radii tried"
         super().__init__(
-            f"smooth: the bend at ({xy[0]:.2f}, {xy[1]:.2f}) can't be rounded with a turning "
-            f"radius of {turning_radius:.2f} m: clearance allows {allows}. "
-            "Ask for less, or for a planner that plans with turns."
+            f"smooth: the bend at {format_point(xy)} can't be rounded with a turning radius of "
+            f"{turning_radius:.2f} m: the clearance allows {allows}. "
+            "Use a smaller turning radius, or a planner that plans curves."
         )
 
 
@@ -250,16 +284,16 @@ class TimeLimitError(NoRouteError):
     planner : str
     time_limit : float [s]
     expanded : int
-        How much was searched, in `unit`.
+        Effort of the search, in `unit`.
     unit : str, default "nodes expanded"
         Sampling planners count "edges checked".
     left : float, optional [m]
-        What was left to the goal from the nearest place that a sampling planner reached.
+        Distance to the goal from the nearest position that a sampling planner reached.
 
     Examples
     --------
     >>> print(TimeLimitError("astar", time_limit=0.5, expanded=180000))
-    astar: no route within time_limit = 0.5 s (180000 nodes expanded). Allow more time.
+    astar: no route within time_limit = 0.5 s (180000 nodes expanded). Increase the limit.
     """
 
     def __init__(
@@ -275,12 +309,12 @@ class TimeLimitError(NoRouteError):
         self.unit, self.left = unit, left
         super().__init__(
             f"{planner}: no route within time_limit = {time_limit:g} s "
-            f"({expanded} {unit}{left_clause(left)}). Allow more time."
+            f"({expanded} {unit}{left_clause(left)}). Increase the limit."
         )
 
 
 class CancelledError(NoRouteError):
-    """The search was cancelled before there was a route.
+    """The search was cancelled before it found a route.
 
     Parameters
     ----------
@@ -288,24 +322,24 @@ class CancelledError(NoRouteError):
     seconds : float [s]
         Since the search began.
     expanded : int
-        Nodes that were expanded; of sampling planners, edges that were checked.
+        Expanded nodes; for sampling planners, checked edges.
 
     Examples
     --------
     >>> print(CancelledError("rrtstar", seconds=0.25, expanded=480))
-    rrtstar: cancelled after 0.25 s, before there was a route (480 nodes expanded).
+    rrtstar: cancelled after 0.25 s, before a route was found (480 nodes expanded).
     """
 
     def __init__(self, planner: str, *, seconds: float, expanded: int) -> None:
         self.planner, self.seconds, self.expanded = planner, seconds, expanded
         super().__init__(
-            f"{planner}: cancelled after {seconds:.2f} s, before there was a route "
+            f"{planner}: cancelled after {seconds:.2f} s, before a route was found "
             f"({expanded} nodes expanded)."
         )
 
 
 class UnsolvedError(NoRouteError):
-    """A sampling planner ended without a route: there may or may not be one.
+    """A sampling planner ended without a route; one may or may not exist.
 
     Parameters
     ----------
@@ -313,14 +347,14 @@ class UnsolvedError(NoRouteError):
     reason : str
         Why it ended.
     expanded : int
-        Edges that were checked.
+        Checked edges.
     left : float, optional [m]
-        What was left to the goal from the nearest place that was reached.
+        Distance to the goal from the nearest position that it reached.
 
     Examples
     --------
     >>> print(UnsolvedError("rrt", reason="iterations = 500 are used up", expanded=480, left=3.2))
-    rrt: no route found: iterations = 500 are used up (480 edges checked, 3.20 m left to the goal).
+    rrt: no route found: iterations = 500 are used up (480 edges checked, 3.20 m from the goal).
     """
 
     def __init__(
@@ -333,12 +367,23 @@ class UnsolvedError(NoRouteError):
 
 
 class AuditError(PlanningError):
-    """A planner returned a route that keeps not what was asked; please report it.
+    """A planner returned a route that violates the requested clearance or endpoints: a bug.
+
+    Parameters
+    ----------
+    fault : str
+        What is wrong with the route, as a predicate.
+    xy : tuple of float [m, map]
+        Where.
+    got, needed : float
+        Measured and required value.
+    unit : str, default "m"
+        Unit of both.
 
     Examples
     --------
-    >>> print(AuditError("comes too near to non-free space", (3.0, 1.5), got=0.31, needed=0.9))
-    audit: the route comes too near to non-free space at (3.00, 1.50): expected 0.9 m, got 0.31 m.
+    >>> print(AuditError("comes too close to a non-free cell", (3.0, 1.5), got=0.31, needed=0.9))
+    audit: the route comes too close to a non-free cell at (3.00, 1.50): expected 0.9 m, got 0.31 m.
     """
 
     def __init__(
@@ -346,6 +391,6 @@ class AuditError(PlanningError):
     ) -> None:
         self.fault, self.xy, self.got, self.needed, self.unit = fault, xy, got, needed, unit
         super().__init__(
-            f"audit: the route {fault} at ({xy[0]:.2f}, {xy[1]:.2f}): "
+            f"audit: the route {fault} at {format_point(xy)}: "
             f"expected {needed:.9g} {unit}, got {got:.9g} {unit}."
         )

@@ -1,4 +1,4 @@
-"""Planning again and again on a map that grows, from a robot that moves."""
+"""Replanning for a moving robot on a growing map."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from planners.costmap.costmap import Costmap, whole_cells
 from planners.costmap.endpoint_check import check_on_map
 from planners.costmap.extent import padded_bounds
 from planners.error_messages import Point
-from planners.errors import ProblemError
 from planners.geometry.rounding import slack_at
 from planners.problem.problem import PlanningProblem
 from planners.route.route import Route
@@ -24,17 +23,17 @@ from planners.search.dstar_lite import DStarLite, DStarLiteSettings
 
 
 class IncrementalPlanner:
-    """Routes to one goal, on a live map, from wherever the robot is.
+    """Routes on a changing map to one goal from the current position of a robot.
 
-    Each route is what `planners.plan` would return at that moment (of routes that cost the same,
-    perhaps another), but only what changed since the last one is worked out again, by D* Lite.
+    Each route has the cost of the route of `planners.plan` on the current map, but D* Lite repairs
+    only the part of the search that is affected by changes since the last route.
 
     Parameters
     ----------
     problem : PlanningProblem
-        Its grid is the live map; its start, where the robot is at first.
+        Its grid is the changing map, its start the first position of the robot.
     **settings
-        Those of `planners.search.dstar_lite.DStarLiteSettings`.
+        Settings of `planners.search.dstar_lite.DStarLiteSettings`.
 
     Raises
     ------
@@ -60,26 +59,25 @@ class IncrementalPlanner:
     """
 
     def __init__(self, problem: PlanningProblem, **settings: Any) -> None:
-        if problem.grid.ndim != 2:
-            raise ProblemError("grid", "a 2-D map", f"one of {problem.grid.ndim}-D")
+        problem.check_dimensions(2)
         self.problem = problem
         self.settings = DStarLiteSettings(**settings)
         self._costmap: Costmap | None = None
         self._engine: DStarLite | None = None
 
     def update(self, changed: npt.ArrayLike) -> None:
-        """Take over cells of the grid that changed; only what they touch is worked out again.
+        """Register changed cells of the grid; only the affected part of the costmap is updated.
 
         Parameters
         ----------
         changed : array_like of int, shape (n, 2)
-            Cells [row, col] of the grid, such as `groundmap.GroundMapper.changed`;
-            cells that the map did not have before among them.
+            Cells [row, col] of the grid, such as `groundmap.GroundMapper.changed`, including
+            cells that the map did not have before.
 
         Raises
         ------
         ProblemError
-            Something else than cells.
+            An array of another shape, or not of integers.
         """
         cells = whole_cells(changed)
         if self._costmap is not None:
@@ -90,29 +88,29 @@ class IncrementalPlanner:
         start: Sequence[float] | Floats | None = None,
         goal: Sequence[float] | Floats | None = None,
     ) -> Route:
-        """Return the route on the map as it is now, which the audit passed.
+        """Return an audited route on the current map.
 
         Parameters
         ----------
         start : sequence of float, optional
-            Where the robot is now: x, y [m] and optionally yaw [rad]; where it was unless told.
+            Position of the robot: x, y [m] and optionally yaw [rad]; default: the last one.
         goal : sequence of float, optional
-            Another goal. The search then begins anew. It is kept
-            even if it is refused: the map may grow to it.
+            A new goal, with which the search starts over; default: the last one. It is kept even
+            if it is outside the map, which may grow to include it.
 
         Raises
         ------
         ProblemError
             A place that is not 2 or 3 finite numbers.
         OutsideMapError, NonFreeError, UnknownSpaceError
-            Start or goal is no place for the footprint.
+            The footprint does not fit at the start or the goal.
         EnclosedError
-            No route joins them.
+            No route connects them.
         TimeLimitError
-            Time ran out. The next call goes on where this one ended.
+            Time ran out. The next call continues the search.
         AuditError
-            The route keeps not what was asked: cells that changed were not said with `update`,
-            or a bug in the planner.
+            The route violates the requested clearance or endpoints: changed cells were not passed
+            to `update`, or the planner has a bug.
         """
         began = now()
         self.problem = replace(
@@ -132,7 +130,7 @@ class IncrementalPlanner:
         return self._engine
 
     def _costmap_now(self) -> Costmap:
-        """Return the costmap of the problem as it is now: what is cleared moves with the start."""
+        """Return the costmap of the current problem; the cleared cells move with the start."""
         before = self._costmap
         if before is None:
             return Costmap.of(self.problem)
@@ -141,7 +139,7 @@ class IncrementalPlanner:
             return here
         now, then = padded_bounds(self.problem), padded_bounds(before.problem)
         if not self.problem.avoids_unknown and (now != then).any():
-            return Costmap.of(self.problem)  # what lies around the map may be driven on, too
+            return Costmap.of(self.problem)  # cells around the map are traversable, too
         cells = np.concatenate([_unknown_cells(before), _unknown_cells(here)])
         return here.with_changes(cells + before.lower_cell)
 
@@ -151,9 +149,9 @@ def _ends(problem: PlanningProblem) -> tuple[Point, Point]:
 
 
 def _unknown_cells(costmap: Costmap) -> Ints:
-    """Return cells near what is cleared, and the ends', if unknown or beyond the window."""
+    """Return the unknown cells near the cleared place and at the ends, also off the window."""
     problem, window = costmap.problem, costmap.window
-    # A little more than the radius: squares that only touch it are cleared, too.
+    # Slightly more than the radius, as squares that only touch it are cleared, too.
     slack = slack_at(problem.clear_place)
     reach = problem.clear_radius + 2.0 * slack if problem.clear_start else 0.0
     corners = [np.array(problem.clear_place) - reach, np.array(problem.clear_place) + reach]

@@ -1,4 +1,4 @@
-"""Why there is no route: the enclosed area, the nearest reachable cell, the narrowest gap."""
+"""Why there is no route: the enclosed area, the nearest reachable cell, the narrowest passage."""
 
 from __future__ import annotations
 
@@ -6,74 +6,73 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from scipy import ndimage
 
 from groundmap.arrays import Bools
 from planners.costmap.costmap import Costmap
-from planners.costmap.endpoint_check import check_start_is_known, costmap_of
-from planners.costmap.voxel_map import Voxels
+from planners.costmap.endpoint_check import check_start_is_known, costmap_of, region_around
+from planners.costmap.map_space import MapSpace
 from planners.error_messages import Place, Point, Turning
 from planners.errors import EnclosedError
 from planners.problem.footprint import Footprint
 from planners.problem.problem import PlanningProblem
-from planners.search.distance_field import reachable
 from planners.search.widest_path import LATTICE_SLACK, WidestRoute, widest_way
 
 
-def explain_enclosure(costmap: Costmap, *, needed: float | None = None) -> EnclosedError:
-    """Return the exception that says why start and goal are not joined.
+def explain_no_route(space: MapSpace, *, headings: bool = False) -> EnclosedError:
+    """Return the exception that explains why start and goal are not connected.
 
     Parameters
     ----------
-    costmap : Costmap
-    needed : float, optional [m]
-        Width of the disc within the footprint, for planners that heed its heading; unless told,
-        that of the disc that holds it however it is turned.
+    space : Costmap or Voxels
+    headings : bool, default False
+        Whether the planner plans headings: only the disc within the footprint is then certain to
+        need its width. Otherwise the disc that holds the footprint at every heading needs it.
 
     Raises
     ------
     UnknownSpaceError
         The start is an island in unknown space.
     """
-    problem, resolution = costmap.problem, costmap.window.resolution
-    radius = costmap.radius if needed is None else needed / 2.0
-    from_start = reachable(costmap, problem.start_xy, radius=radius)
-    check_start_is_known(costmap)
-    from_goal = reachable(costmap, problem.goal_xy, radius=radius)
+    problem = space.problem
+    radius = problem.shape.inscribed_radius if headings else problem.radius
+    free = space.traversable if radius == space.radius else space.traversable_for(radius)
+    from_start = region_around(space, free, problem.start_xy, radius=radius)
+    check_start_is_known(space)
+    from_goal = region_around(space, free, problem.goal_xy, radius=radius)
     place: Place = "start" if from_start.sum() < from_goal.sum() else "goal"
-    fenced = from_start if place == "start" else from_goal
-    nearest, distance = _nearest(costmap, from_start)
-    widest = widest_way(costmap, seen_from=place)
-    turning: Turning = "none" if problem.shape.is_disc else "anyhow"
+    nearest, distance = _nearest(space, from_start)
+    width, bottleneck = _widest(space, place)
+    turning: Turning = "none" if problem.shape.is_disc else "any"
     return EnclosedError(
         place,
-        area=float(fenced.sum()) * resolution**2,
+        area=space.area_of(from_start if place == "start" else from_goal),
         nearest=nearest,
         distance=distance,
-        widest_gap=0.0 if widest is None else widest.width,
-        bottleneck=None if widest is None else widest.bottleneck,
+        widest_gap=width,
+        bottleneck=bottleneck,
         needed=2.0 * radius,
-        slack=LATTICE_SLACK * resolution,
-        turning=turning if needed is None else "heeded",
+        slack=LATTICE_SLACK * space.window.resolution,
+        turning="planned" if headings else turning,
     )
 
 
 def widest_route(problem: PlanningProblem) -> WidestRoute:
-    """Return the widest route from start to goal: what the widest robot would do.
+    """Return the widest route from start to goal: the one that the widest robot could follow.
 
-    It leads along the half-cell lattice; a slanted way may be wider by up to 0.71 cells. The
-    footprint does not matter, but for what is cleared around the start.
+    It follows the half-cell lattice; a slanted passage may be wider by up to 0.71 cells. The
+    footprint only matters for the unknown cells that are cleared around the start.
 
     Parameters
     ----------
     problem : PlanningProblem
+        On a 2-D map.
 
     Raises
     ------
     OutsideMapError, NonFreeError, UnknownSpaceError
-        Start or goal is no place even for a point.
+        Not even a point fits at the start or the goal.
     EnclosedError
-        No way joins them, however narrow.
+        No passage connects them, however narrow.
 
     Examples
     --------
@@ -91,55 +90,22 @@ def widest_route(problem: PlanningProblem) -> WidestRoute:
     costmap = costmap_of(point)
     widest = widest_way(costmap)
     if widest is None:
-        raise explain_enclosure(costmap)
+        raise explain_no_route(costmap)
     return widest
 
 
-def _nearest(costmap: Costmap, reached: Bools) -> tuple[Point, float]:
-    """Return the reached centre nearest to the goal, else the start, and its distance."""
-    centres = costmap.window.cell_to_world(np.argwhere(reached))
-    places = centres if len(centres) else np.array([costmap.problem.start_xy])
-    distances = np.hypot(*(places - costmap.problem.goal_xy).T)
+def _widest(space: MapSpace, place: Place) -> tuple[float, Point | None]:
+    """Return width and bottleneck of the widest passage; NaN and None on a 3-D map."""
+    if not isinstance(space, Costmap):
+        return math.nan, None
+    widest = widest_way(space, seen_from=place)
+    return (0.0, None) if widest is None else (widest.width, widest.bottleneck)
+
+
+def _nearest(space: MapSpace, reached: Bools) -> tuple[Point, float]:
+    """Return the reached cell centre nearest to the goal and its distance; else the start's."""
+    centres = space.window.cell_to_world(np.argwhere(reached))
+    places = centres if len(centres) else np.array([space.problem.start_xy])
+    distances = np.hypot.reduce(places - space.problem.goal_xy, axis=1)
     i = int(distances.argmin())
-    return (float(places[i, 0]), float(places[i, 1])), float(distances[i])
-
-
-def explain_enclosure_3d(voxels: Voxels) -> EnclosedError:
-    """Return the exception that says why start and goal are not joined.
-
-    Raises
-    ------
-    UnknownSpaceError
-        The start is an island in unknown space.
-    """
-    problem, resolution = voxels.problem, voxels.window.resolution
-    # All voxels of a move's box must be free: whoever gets anywhere gets there over faces.
-    parts, _ = ndimage.label(voxels.traversable)
-    from_start, from_goal = (
-        _around(voxels, parts, xyz) for xyz in (problem.start_xy, problem.goal_xy)
-    )
-    check_start_is_known(voxels)
-    place: Place = "start" if from_start.sum() < from_goal.sum() else "goal"
-    fenced = from_start if place == "start" else from_goal
-    centres = voxels.window.cell_to_world(np.argwhere(from_start))
-    places = centres if len(centres) else np.array([problem.start_xy])
-    distances = np.linalg.norm(places - problem.goal_xy, axis=1)
-    nearest = int(distances.argmin())
-    return EnclosedError(
-        place,
-        area=float(fenced.sum()) * resolution**3,
-        nearest=tuple(places[nearest].tolist()),
-        distance=float(distances[nearest]),
-        widest_gap=math.nan,
-        needed=2.0 * problem.radius,
-    )
-
-
-def _around(voxels: Voxels, parts: Bools, xyz: Point) -> Bools:
-    """Return the voxels that can be reached from those around a place."""
-    position = voxels.to_cells(xyz)[0][::-1] - 0.5
-    low, high = np.floor(position).astype(int), np.ceil(position).astype(int)
-    box = tuple(slice(max(i, 0), j + 1) for i, j in zip(low, high, strict=True))
-    near = np.unique(parts[box])
-    reached: Bools = np.isin(parts, near[near > 0])
-    return reached
+    return tuple(places[i].tolist()), float(distances[i])

@@ -5,16 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from planners.costmap.endpoint_check import check_on_map, space_of
-from planners.costmap.voxel_map import Voxels
 from planners.errors import ProblemError
 from planners.problem.problem import PlanningProblem
-from planners.registry import Planner, get_planner
+from planners.registry import Planner, get_planner, make_engine
 from planners.route.route import Route
 from planners.route.solve import solve
-from planners.search.astar3d import AStar3D
 from planners.search.base import Cancel, OnImproved, check_cancel, now
-
-SPATIAL = ("astar", "auto")  # planners that plan on 3-D maps, too
 
 
 def plan(
@@ -25,7 +21,7 @@ def plan(
     cancel: Cancel | None = None,
     **settings: Any,
 ) -> Route:
-    """Return a route that the audit passed, or raise an exception that says why there is none.
+    """Return an audited route, or raise an exception with the reason why there is none.
 
     Parameters
     ----------
@@ -33,33 +29,33 @@ def plan(
     planner : str, default "astar"
         A name in `PLANNERS`.
     on_improved : callable, optional
-        Called with an `Improvement` for the first route and every better one, while the search
-        goes on. If it returns True, it hears no more, and the search ends. Only "ara" and sampling
-        planners tell.
+        Called with an `Improvement` for the first route and every better one during the search.
+        If it returns True, it is not called again and the search ends. Only supported by "ara" and
+        sampling planners.
     cancel : Cancel, optional
-        Such as a `threading.Event`: once another thread sets it, the search ends, with the best
-        route so far. Only "ara" and sampling planners look at it.
+        Such as a `threading.Event`: once another thread sets it, the search ends with the best
+        route so far. Only supported by "ara" and sampling planners.
     **settings
         The planner's settings, such as `planners.AStarSettings`.
 
     Raises
     ------
     ProblemError
-        No planner of that name, or one that can neither tell nor be cancelled.
+        No planner of that name, or one that does not support an option.
     SettingsError
         An unknown setting, or one out of its range (from `groundmap.errors`).
     OutsideMapError, NonFreeError, UnknownSpaceError
-        Start or goal is no place for the footprint.
+        The footprint does not fit at the start or the goal.
     EnclosedError
-        No route joins them.
+        No route connects them.
     TimeLimitError
         Time ran out.
     CancelledError
-        The search was cancelled before there was a route.
+        The search was cancelled before a route was found.
     UnsolvedError
         A sampling planner ended without a route.
     AuditError
-        The planner's route keeps not what was asked: a bug in the planner.
+        The route violates the requested clearance or endpoints: a bug in the planner.
 
     Examples
     --------
@@ -77,26 +73,18 @@ def plan(
     watch = _watch(planner, entry, on_improved=on_improved, cancel=cancel)
     check_on_map(problem, goal=not chosen.takes_other_goals)
     space = space_of(problem)
-    if isinstance(space, Voxels) and not entry.spatial:
-        return solve(space, _engine_3d(space, planner), chosen, began=began)
+    engine = make_engine(space, planner)
     headings = entry.headings and chosen.heeds_headings(problem)
-    return solve(space, entry.engine(space), chosen, began=began, headings=headings, watch=watch)
+    return solve(space, engine, chosen, began=began, headings=headings, watch=watch)
 
 
 def _watch(planner: str, entry: Planner, **watch: Any) -> dict[str, Any]:
-    """Return what an anytime planner is to tell of or to look at; others have no such thing."""
-    asked = {name: value for name, value in watch.items() if value is not None}
-    if asked and not entry.anytime:
-        expected = "none, or an anytime planner: 'ara' or a sampling one"
-        raise ProblemError(next(iter(asked)), expected, repr(planner))
-    if "on_improved" in asked and not callable(asked["on_improved"]):
-        raise ProblemError("on_improved", "a callable", repr(asked["on_improved"]))
-    check_cancel(asked.get("cancel"))
-    return asked
-
-
-def _engine_3d(space: Voxels, planner: str) -> AStar3D:
-    if planner not in SPATIAL:
-        expected = f"one that plans on 3-D maps: {', '.join(SPATIAL)}, or a sampling one"
-        raise ProblemError("planner", expected, repr(planner))
-    return AStar3D(space)
+    """Return the options of the search of an anytime planner; others have none."""
+    options = {name: value for name, value in watch.items() if value is not None}
+    if options and not entry.anytime:
+        expected = "no such option, or an anytime planner: 'ara' or a sampling planner"
+        raise ProblemError(next(iter(options)), expected, repr(planner))
+    if "on_improved" in options and not callable(options["on_improved"]):
+        raise ProblemError("on_improved", "a callable", repr(options["on_improved"]))
+    check_cancel(options.get("cancel"))
+    return options

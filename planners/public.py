@@ -1,4 +1,4 @@
-"""The names that `planners` shows on the outside; it loads this module when one is asked for."""
+"""The public names of `planners`, which loads this module on the first access to one of them."""
 
 from planners.batch_planning import plan_many
 from planners.errors import (

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator, MutableMapping
 from functools import cache, partial
 from typing import NamedTuple
 
+from planners.costmap.costmap import Costmap
+from planners.costmap.map_space import MapSpace
 from planners.errors import ProblemError
 from planners.sampling.ompl_module import samplers
 from planners.sampling.ompl_search import THREADED
@@ -20,6 +22,7 @@ from planners.search.astar import (
     WeightedAStar,
     WeightedAStarSettings,
 )
+from planners.search.astar3d import AStar3D
 from planners.search.auto import Auto, AutoSettings
 from planners.search.base import Engine, SearchSettings
 from planners.search.dstar_lite import DStarLite, DStarLiteSettings
@@ -32,23 +35,24 @@ from planners.search.theta import LazyTheta, LazyThetaSettings, Theta, ThetaSett
 class Planner(NamedTuple):
     """A planner."""
 
-    engine: Callable[..., Engine]  #: made on a `Costmap`; some also on `Voxels`
+    engine: Callable[..., Engine]  #: makes its search engine on a `Costmap`
     settings: type[SearchSettings]  #: class of its settings
-    headings: bool = False  #: whether it heeds headings
-    anytime: bool = False  #: whether it tells of routes while it searches, and can be cancelled
-    spatial: bool = False  #: whether it can be made on `Voxels`
-    repeatable: bool = True  #: whether it repeats a route exactly, if no time limit ends it
+    headings: bool = False  #: whether it plans headings
+    anytime: bool = False  #: whether it reports routes during the search and can be cancelled
+    engine_3d: Callable[..., Engine] | None = None  #: makes its search engine on `Voxels`
+    repeatable: bool = True  #: whether it repeats a route exactly unless a time limit ends it
 
 
 class Planners(MutableMapping[str, Planner]):
-    """Planners by name: our own, and those of OMPL where it is installed.
+    """Planners by name: those of this package, and those of OMPL if it is installed.
 
-    OMPL is loaded by what can't be answered without it: a name that is not one of ours, or a list
-    of all. So neither an import of this package nor a plan with A* waits for it.
+    OMPL is only loaded for names that are not in this package and for a list of all names, so that
+    neither an import of this package nor a plan with A* waits for it.
 
     Parameters
     ----------
     own : dict
+        Planners of this package.
 
     Examples
     --------
@@ -83,7 +87,7 @@ def _sampling() -> dict[str, Planner]:
             SamplingSettings,
             headings=True,
             anytime=True,
-            spatial=True,
+            engine_3d=partial(SamplingPlanner, name),
             repeatable=name not in THREADED,
         )
         for name in samplers()
@@ -91,9 +95,9 @@ def _sampling() -> dict[str, Planner]:
 
 
 OWN_PLANNERS: dict[str, Planner] = {
-    "astar": Planner(AStar, AStarSettings),
+    "astar": Planner(AStar, AStarSettings, engine_3d=AStar3D),
     "ara": Planner(ARA, ARASettings, anytime=True),
-    "auto": Planner(Auto, AutoSettings),
+    "auto": Planner(Auto, AutoSettings, engine_3d=AStar3D),
     "dijkstra": Planner(Dijkstra, DijkstraSettings),
     "dstar_lite": Planner(DStarLite, DStarLiteSettings),
     "hybrid_astar": Planner(HybridAStar, HybridAStarSettings, headings=True),
@@ -113,7 +117,7 @@ def get_planner(planner: str) -> Planner:
     Raises
     ------
     ProblemError
-        There is none; the sentence names those there are.
+        There is none; the message lists the available names.
     """
     if not isinstance(planner, str) or planner not in PLANNERS:
         raise ProblemError(
@@ -123,3 +127,26 @@ def get_planner(planner: str) -> Planner:
             hint="" if samplers() else "Sampling planners need OMPL: pip install ompl.",
         )
     return PLANNERS[planner]
+
+
+def make_engine(space: MapSpace, planner: str) -> Engine:
+    """Return the search engine of a planner on a map.
+
+    Parameters
+    ----------
+    space : Costmap or Voxels
+    planner : str
+        A name in `PLANNERS`.
+
+    Raises
+    ------
+    ProblemError
+        A 3-D map, which the planner does not support.
+    """
+    entry = PLANNERS[planner]
+    make = entry.engine if isinstance(space, Costmap) else entry.engine_3d
+    if make is None:
+        own = (name for name, one in OWN_PLANNERS.items() if one.engine_3d is not None)
+        expected = f"one that supports 3-D maps: {', '.join(own)} or a sampling planner"
+        raise ProblemError("planner", expected, repr(planner))
+    return make(space)

@@ -72,10 +72,10 @@ def one_by_one(
     return answers
 
 
-def told(answer: Route | NoRouteError) -> dict[str, Any]:
-    """Return all that an answer says, apart from the time it took."""
+def outcome_of(answer: Route | NoRouteError) -> dict[str, Any]:
+    """Return the content of an answer except its duration."""
     if isinstance(answer, NoRouteError):
-        return {"error": type(answer), "says": str(answer)}
+        return {"error": type(answer), "message": str(answer)}
     values = {field.name: getattr(answer, field.name) for field in fields(answer)}
     arrays = {name: values[name].tolist() for name in ("waypoints", "headings")}
     return values | arrays | {"seconds": None}
@@ -94,13 +94,13 @@ def test_answers_are_those_of_plan_whatever_the_threads(
     problem = problem_of(seed, clear_start=clear_start, costs=costs)
     pairs = pairs_of(seed)
     answers = plan_many(problem, pairs, "astar", threads=threads)
-    assert [told(answer) for answer in answers] == [
-        told(answer) for answer in one_by_one(problem, pairs)
+    assert [outcome_of(answer) for answer in answers] == [
+        outcome_of(answer) for answer in one_by_one(problem, pairs)
     ]
 
 
 @pytest.mark.parametrize("planner", sorted(OWN_PLANNERS.keys() - {"astar3d", "hybrid_astar"}))
-def test_every_planner_says_what_it_says_alone(planner: str) -> None:
+def test_every_planner_answers_as_for_single_queries(planner: str) -> None:
     problem, pairs = problem_of(7, clear_start=False), pairs_of(7, count=6)
     many = plan_many(problem, pairs, planner, threads=2)
     for got, expected in zip(many, one_by_one(problem, pairs, planner), strict=True):
@@ -142,7 +142,7 @@ def test_unknown_cells_are_cleared_at_the_problems_start_and_nowhere_else() -> N
     assert isinstance(at_start, Route)
 
 
-def test_a_yaw_asked_for_is_the_last_heading() -> None:
+def test_a_requested_yaw_is_the_last_heading() -> None:
     (route,) = plan_many(problem_of(2), [((6, 6, 0.0), (12, 6, 1.5))], "astar")
     assert isinstance(route, Route)
     assert route.headings[-1] == 1.5
@@ -166,7 +166,7 @@ def test_a_malformed_pair_is_refused_by_its_number(pair: Any, sentence: str) -> 
         plan_many(problem_of(0), [((6, 6), (9, 9)), pair], "astar")
 
 
-def test_what_is_wrong_with_all_queries_is_raised() -> None:
+def test_errors_that_concern_all_queries_are_raised() -> None:
     with pytest.raises(
         ProblemError, match=r"planner: expected one of (aorrtc, )?ara, astar, .* got 'astral'"
     ):
@@ -179,12 +179,12 @@ def test_what_is_wrong_with_all_queries_is_raised() -> None:
     solid = PlanningProblem(
         ConfidenceGrid(origin=(0, 0, 0)), start=(0, 0, 0), goal=(1, 1, 1), footprint=1
     )
-    with pytest.raises(ProblemError, match="grid: expected a 2-D map, got a 3-D one"):
+    with pytest.raises(ProblemError, match="grid: expected a 2-D map, got a 3-D map"):
         plan_many(solid, [], "astar")
 
 
 class Straight:
-    """A planner that heeds no obstacle, and counts how many of it were made."""
+    """A planner that ignores obstacles and counts its instances."""
 
     name = "straight"
     made: list[str]
@@ -202,7 +202,7 @@ class Straight:
         return SearchResult(np.array([start[:2], goal[:2]]), 0)
 
 
-def test_routes_are_audited_unless_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_routes_are_audited_by_default(monkeypatch: pytest.MonkeyPatch) -> None:
     Straight.made = []
     monkeypatch.setitem(PLANNERS, "straight", Planner(Straight, SearchSettings))
     problem = PlanningProblem(
@@ -217,7 +217,7 @@ def test_routes_are_audited_unless_told(monkeypatch: pytest.MonkeyPatch) -> None
         assert isinstance(route, Route)
         assert route.audit == "skipped"
     assert Straight.made == ["built", "twin", "twin"]
-    with pytest.raises(AuditError, match="too near to a nonfree cell"):
+    with pytest.raises(AuditError, match="too close to a non-free cell"):
         plan_many(problem, pairs, "straight", threads=3)
 
 
@@ -236,7 +236,7 @@ def test_an_engine_without_twins_is_built_for_each_thread(monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize(("planner", "shared"), [(JPSPlus, "jumps"), (Polyanya, "mesh")])
-def test_what_engines_work_out_about_a_map_is_shared(planner: type[Any], shared: str) -> None:
+def test_tables_of_a_map_are_shared_between_engines(planner: type[Any], shared: str) -> None:
     first = planner(Costmap.of(problem_of(0)))
     twin = first.twin()
     assert getattr(twin, shared) is getattr(first, shared)

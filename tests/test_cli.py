@@ -206,11 +206,11 @@ def test_plan_counts_unknown_space_where_that_is_allowed(square: Path) -> None:
             BEYOND,
             (),
             "OutsideMapError",
-            "goal (90.00, 5.00): outside the map: expected a place on it",
+            "goal (90.00, 5.00) is outside the map: expected a point on an observed tile",
         ),
         (ON_RING, (), "NonFreeError", "overlaps non-free space"),
         (IN_STRIP, (), "UnknownSpaceError", "overlaps unknown or contested space"),
-        (INSIDE_RING, (), "EnclosedError", "the goal is fenced in"),
+        (INSIDE_RING, (), "EnclosedError", "the goal is enclosed"),
         ("20,3", ("--time-limit", "1e-9"), "TimeLimitError", "no route within time_limit"),
     ],
 )

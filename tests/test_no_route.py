@@ -1,4 +1,4 @@
-"""Why there is no route: who is fenced in, how far one gets, and the place that is too narrow."""
+"""Why there is no route: the enclosed end, the nearest reachable cell, the narrow passage."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from groundmap.grid.grid import ConfidenceGrid
 from oracles_planning import BLOCKED, FREE, free_field, grid_of
 from planners import EnclosedError, NonFreeError, PlanningProblem, Route, plan
 from planners.costmap.costmap import Costmap
-from planners.no_route import explain_enclosure, widest_route
+from planners.no_route import explain_no_route, widest_route
 from planners.search.distance_field import reachable
 from planners.search.widest_path import WidestRoute
 from strategies import rngs
 
 T = TypeVar("T")
 
-CAR = [(-0.5, -0.4), (1.5, -0.4), (1.5, 0.4), (-0.5, 0.4)]  # 0.8 m wide, 2 x 1.55 m turned anyhow
+CAR = [(-0.5, -0.4), (1.5, -0.4), (1.5, 0.4), (-0.5, 0.4)]  # 0.8 m wide, 3.10 m at any heading
 FACTS: dict[str, Any] = {"area": 3.0, "nearest": (1.0, 2.0), "distance": 1.5}
 
 
@@ -38,51 +38,59 @@ def across(grid: ConfidenceGrid, footprint: Any) -> PlanningProblem:
 
 
 def failure(problem: PlanningProblem) -> EnclosedError:
-    with pytest.raises(EnclosedError, match=r"no route: the .* is fenced in") as caught:
+    with pytest.raises(EnclosedError, match=r"no route: the .* is enclosed") as caught:
         plan(problem)
     return caught.value
 
 
-def test_a_gap_that_is_too_narrow_is_named_with_its_place_and_what_is_needed() -> None:
+def test_a_narrow_gap_is_reported_with_its_place_and_the_required_width() -> None:
     error = failure(across(halves(gap=3), 0.9))
     assert (error.widest_gap, error.needed, error.bottleneck) == (1.5, 1.8, (15.5, 20.75))
-    tail = "; the widest way is about 1.50 m wide at (15.50, 20.75), your footprint needs 1.80 m."
+    tail = (
+        ". The widest passage is about 1.50 m wide at (15.50, 20.75); the footprint needs 1.80 m."
+    )
     assert str(error).endswith(tail)
 
 
-def test_an_outline_is_said_to_be_turned_anyhow() -> None:
+def test_an_outline_needs_the_width_of_its_disc_at_any_heading() -> None:
     error = failure(across(halves(gap=3), CAR))
     assert error.needed == pytest.approx(2 * math.hypot(1.5, 0.4))
-    assert error.turning == "anyhow"
-    assert str(error).endswith("(15.50, 20.75), your footprint, turned anyhow, needs 3.10 m.")
+    assert error.turning == "any"
+    assert str(error).endswith("(15.50, 20.75); the footprint needs 3.10 m to fit at any heading.")
 
 
-def test_a_planner_that_heeds_the_heading_says_what_it_needs() -> None:
-    problem = across(halves(gap=1), CAR)
-    narrow = explain_enclosure(Costmap.of(problem), needed=0.9)
-    assert (narrow.widest_gap, narrow.turning) == (0.5, "heeded")
+def car(*, width: float, rear: float = -0.5) -> list[tuple[float, float]]:
+    half = width / 2.0
+    return [(rear, -half), (1.5, -half), (1.5, half), (rear, half)]
+
+
+def test_planners_of_headings_need_the_width_of_the_inscribed_disc() -> None:
+    problem = across(halves(gap=1), car(width=0.9))
+    narrow = explain_no_route(Costmap.of(problem), headings=True)
+    assert narrow.needed == 0.9
+    assert (narrow.widest_gap, narrow.turning) == (0.5, "planned")
     assert str(narrow).endswith(
-        "0.50 m wide at (15.50, 20.25), your footprint needs 0.90 m at least."
+        "0.50 m wide at (15.50, 20.25); the footprint needs at least 0.90 m."
     )
-    for gap, needed in ((3, 0.8), (1, 0.8), (1, 0.0)):
-        wide = explain_enclosure(Costmap.of(across(halves(gap=gap), CAR)), needed=needed)
+    for gap, outline in ((3, CAR), (1, car(width=0.5)), (1, car(width=0.8, rear=0.5))):
+        wide = explain_no_route(Costmap.of(across(halves(gap=gap), outline)), headings=True)
         assert str(wide) == (
-            "no route that can be driven was found, looking at one pose for each cell and heading: "
-            "turn in smaller circles, leave it more room, or map with smaller cells."
+            "no route: a search over one pose per cell and heading found no drivable motion. "
+            "Use a smaller turning radius, a smaller footprint, or a map with smaller cells."
         )
 
 
-def test_a_width_near_what_is_needed_is_an_estimate() -> None:
+def test_a_width_near_the_required_one_is_an_estimate() -> None:
     facts = FACTS | {"widest_gap": 1.0, "slack": 0.1}
-    assert "is about 1.00 m wide, your footprint needs 1.05 m." in str(
+    assert "is about 1.00 m wide; the footprint needs 1.05 m." in str(
         EnclosedError("goal", **facts, needed=1.05)
     )
-    assert "is 1.00 m wide, your footprint needs 1.15 m." in str(
+    assert "is 1.00 m wide; the footprint needs 1.15 m." in str(
         EnclosedError("goal", **facts, needed=1.15)
     )
 
 
-def test_a_slanted_gap_is_wider_than_the_lattice_says_by_less_than_the_slack() -> None:
+def test_a_slanted_gap_exceeds_its_lattice_width_by_less_than_the_slack() -> None:
     z = free_field(40, 40)
     z[:18, :20] = z[20:, 23:] = BLOCKED  # corners at (20, 18) and (23, 20)
     ends: dict[str, Any] = {"start": (10.5, 30.5), "goal": (30.5, 10.5), "clear_start": False}
@@ -92,25 +100,28 @@ def test_a_slanted_gap_is_wider_than_the_lattice_says_by_less_than_the_slack() -
     assert "about 3.16 m wide" in str(failure(problem))
 
 
-def test_a_way_that_misses_the_cell_centres_is_told_from_one_that_is_too_narrow() -> None:
+def test_a_passage_that_misses_the_cell_centres_is_distinguished_from_one_that_is_too_narrow() -> (
+    None
+):
     error = failure(across(halves(gap=2), 0.45))
     assert error.widest_gap > error.needed
     sentence = (
-        "the widest way is 1.00 m wide at (15.50, 20.50), enough for what your footprint needs, "
-        "0.90 m, but not along cell centres: map with smaller cells, or plan with 'hybrid_astar'."
+        "The widest passage is 1.00 m wide at (15.50, 20.50), which is enough for the footprint "
+        "(0.90 m), but it does not follow cell centres. Use a map with smaller cells, or plan with "
+        "'hybrid_astar'."
     )
     assert str(error).endswith(sentence)
 
 
-def test_where_no_way_exists_there_is_no_place_to_widen() -> None:
+def test_without_a_passage_there_is_no_bottleneck() -> None:
     error = failure(across(halves(gap=0), 0.9))
     assert (error.widest_gap, error.bottleneck) == (0.0, None)
-    assert str(error).endswith("no way from start to goal exists, however narrow the footprint.")
+    assert str(error).endswith("No passage connects start and goal, however narrow the footprint.")
 
 
 @given(rngs())
 @settings(max_examples=25, deadline=None)
-def test_the_widest_route_says_the_same_width(rng: np.random.Generator) -> None:
+def test_the_widest_route_has_the_same_width(rng: np.random.Generator) -> None:
     z = free_field(48, 48)
     for row, col in rng.integers(0, 48, (60, 2)).tolist():
         z[row : row + 4, col : col + 4] = BLOCKED
@@ -132,7 +143,7 @@ def attempt(ask: Callable[[PlanningProblem], T], problem: PlanningProblem) -> T 
         return error
 
 
-def test_who_can_reach_less_is_fenced_in() -> None:
+def test_the_end_with_the_smaller_reachable_area_is_fenced_in() -> None:
     z = free_field(64, 64)
     z[:, 20:22] = BLOCKED
     left = PlanningProblem(grid_of(z), start=(9.5, 9.5), goal=(40.5, 9.5), footprint=1.5)
@@ -156,16 +167,16 @@ def test_reach_shrinks_with_the_radius() -> None:
 
 def test_widths_are_shown_with_the_decimals_that_tell_them_apart() -> None:
     nearly = EnclosedError("goal", **FACTS, widest_gap=0.5999, needed=0.6)
-    assert str(nearly).endswith("is 0.5999 m wide, your footprint needs 0.6000 m.")
+    assert str(nearly).endswith("is 0.5999 m wide; the footprint needs 0.6000 m.")
     same = EnclosedError("goal", **FACTS, widest_gap=0.6, needed=0.6)
-    assert "is 0.60 m wide, enough for what your footprint needs, 0.60 m, but not" in str(same)
+    assert "is 0.60 m wide, which is enough for the footprint (0.60 m), but" in str(same)
 
 
 def test_in_space_volumes_are_enclosed_and_gaps_not_measured() -> None:
     facts = FACTS | {"nearest": (1.0, 2.0, 0.5)}
     error = EnclosedError("start", **facts, widest_gap=math.nan, needed=0.6)
     assert str(error) == (
-        "no route: the start is fenced in: an enclosed space of 3.0 m³ around it; the reachable "
+        "no route: the start is enclosed in a space of 3.0 m³; the reachable "
         "cell nearest to the goal is (1.00, 2.00, 0.50), 1.50 m away."
     )
 

@@ -48,7 +48,10 @@ def problem(grid: ConfidenceGrid = FIELD, **values: Any) -> PlanningProblem:
         ({"footprint": -0.1}, "footprint: expected a radius of 0 or more .*, got -0.1"),
         ({"footprint": math.nan}, "footprint: expected a radius of 0 or more .*, got nan"),
         ({"footprint": "wide"}, "footprint: expected a radius .*, got 'wide'"),
-        ({"footprint": [(0, 0), (1, 1), (1, 0), (0, 1)]}, r"footprint: .* meets itself at \(0.5"),
+        (
+            {"footprint": [(0, 0), (1, 1), (1, 0), (0, 1)]},
+            r"footprint: .* a self-intersection at \(0.5",
+        ),
         ({"costs": {"clearance_weight": 1}}, "costs: expected CostSettings, got {'clear"),
         ({"clear_start_radius": -1}, "clear_start_radius: expected a radius from 0 to"),
         ({"unknown": "perhaps"}, "unknown: expected 'avoid', 'allow' or 'penalise', got 'perhaps'"),
@@ -60,12 +63,12 @@ def problem(grid: ConfidenceGrid = FIELD, **values: Any) -> PlanningProblem:
         ({"grid": "map.npz"}, "grid: expected a ConfidenceGrid, got 'map.npz'"),
     ],
 )
-def test_a_problem_that_cannot_be_posed_is_refused(values: dict[str, Any], sentence: str) -> None:
+def test_an_invalid_problem_is_refused(values: dict[str, Any], sentence: str) -> None:
     with pytest.raises(ProblemError, match=sentence):
         problem(**values)
 
 
-def test_an_unknown_planner_is_refused_with_what_there_is() -> None:
+def test_an_unknown_planner_is_refused_with_the_available_names() -> None:
     with pytest.raises(ProblemError, match=r"planner: expected one of .*ara, .*, got 'astral'"):
         plan(problem(), "astral")
     assert "astar" in PLANNERS
@@ -75,7 +78,7 @@ def test_an_unknown_planner_is_refused_with_what_there_is() -> None:
 @pytest.mark.parametrize("xy", [(1000, 0), (-5, 5), (64.5, -70)])
 def test_places_beyond_the_touched_tiles_are_outside(place: str, xy: tuple[float, float]) -> None:
     where = rf"{place} \({xy[0]:.2f}, {xy[1]:.2f}\)"
-    sentence = rf"{where}: outside the map: expected a place on it.*0.00 to 64.00"
+    sentence = rf"{where} is outside the map: expected a point on an observed tile.*0.00 to 64.00"
     asked: dict[str, Any] = {place: xy}
     with pytest.raises(OutsideMapError, match=sentence) as caught:
         plan(problem(**asked))
@@ -84,7 +87,7 @@ def test_places_beyond_the_touched_tiles_are_outside(place: str, xy: tuple[float
 
 
 def test_an_empty_map_has_no_inside() -> None:
-    with pytest.raises(OutsideMapError, match="which is empty"):
+    with pytest.raises(OutsideMapError, match="the map has none"):
         plan(problem(ConfidenceGrid()))
 
 
@@ -106,7 +109,7 @@ def test_a_footprint_over_nonfree_space_is_named_with_its_clearance(place: str) 
     z[20, 20] = BLOCKED
     sentence = (
         rf"{place} \(22.50, 20.50\): the footprint \(radius 2.00 m\) overlaps non-free space; "
-        r"clearance there is 1.50 m\."
+        r"the clearance there is 1.50 m\."
     )
     with pytest.raises(NonFreeError, match=sentence) as caught:
         plan(problem(grid_of(z), **{place: (22.5, 20.5)}, footprint=2))
@@ -146,7 +149,7 @@ def test_a_footprint_over_unknown_or_contested_space_is_named(
         (BLOCKED, UNSEEN, NonFreeError, "overlaps non-free space"),
     ],
 )
-def test_the_state_of_the_place_itself_comes_before_what_is_near(
+def test_the_state_of_the_place_itself_takes_precedence(
     at_goal: float, beside: float, error: type[NoRouteError], sentence: str
 ) -> None:
     z = free_field(64, 64)
@@ -172,7 +175,7 @@ def pocket(*, gap: int = 0) -> ConfidenceGrid:
 
 
 def test_an_enclosed_pocket_reports_its_area() -> None:
-    sentence = "the goal is fenced in: an enclosed area of 30.0 m².*no way from start to goal exist"
+    sentence = "the goal is enclosed in an area of 30.0 m².*No passage connects start and goal"
     with pytest.raises(EnclosedError, match=sentence) as caught:
         plan(problem(pocket(), start=(2.25, 2.25), goal=(18.25, 17.25), footprint=0.0))
     error = caught.value
@@ -182,8 +185,8 @@ def test_an_enclosed_pocket_reports_its_area() -> None:
     assert error.distance == pytest.approx(3.5)
 
 
-def test_whoever_has_less_room_is_fenced_in() -> None:
-    with pytest.raises(EnclosedError, match="the start is fenced in") as caught:
+def test_the_end_with_less_room_is_enclosed() -> None:
+    with pytest.raises(EnclosedError, match="the start is enclosed") as caught:
         plan(problem(pocket(), start=(18.25, 17.25), goal=(2.25, 2.25), footprint=0.5))
     assert caught.value.place == "start"
     # Centres at least 0.5 m away from the walls: the room without a rim of one cell.
@@ -192,15 +195,17 @@ def test_whoever_has_less_room_is_fenced_in() -> None:
 
 @pytest.mark.parametrize("gap", [1, 2, 3])
 def test_the_widest_way_is_as_wide_as_the_gap(gap: int) -> None:
-    sentence = rf"{gap * 0.5:.2f} m wide at \(14.50, 16.\d+\), your footprint needs {gap + 1}"
+    sentence = rf"{gap * 0.5:.2f} m wide at \(14.50, 16.\d+\); the footprint needs {gap + 1}"
     with pytest.raises(EnclosedError, match=sentence) as caught:
         plan(into_the_pocket(gap=gap, footprint=(gap + 1) / 2))
     assert caught.value.widest_gap == pytest.approx(gap * 0.5)
     assert caught.value.needed == gap + 1
 
 
-def test_a_way_that_misses_the_cell_centres_is_told_from_one_that_is_too_narrow() -> None:
-    sentence = r"is 1.00 m wide at .*, enough for .* needs, 0.90 m, but not along cell centres"
+def test_a_passage_that_misses_the_cell_centres_is_distinguished_from_a_narrow_one() -> None:
+    sentence = (
+        r"is 1.00 m wide at .*, which is enough .* \(0.90 m\), but it does not follow cell centres"
+    )
     with pytest.raises(EnclosedError, match=sentence):
         plan(into_the_pocket(gap=2, footprint=0.45))
     assert plan(into_the_pocket(gap=3, footprint=0.75)).min_clearance == 0.75
@@ -242,7 +247,7 @@ def test_a_forward_camera_gets_off_its_unknown_start() -> None:
     assert route.start_unknown_area > 0.5
     with pytest.raises(UnknownSpaceError, match="start"):
         plan(problem(grid, **asked, clear_start=False))
-    with pytest.raises(EnclosedError, match="the start is fenced in"):
+    with pytest.raises(EnclosedError, match="the start is enclosed"):
         plan(problem(grid, **asked, clear_start_radius=0.9))
 
 
@@ -263,15 +268,15 @@ def beside_a_wall(yaw: float, **values: Any) -> PlanningProblem:
     return problem(grid_of(z), **(asked | values))
 
 
-def test_an_outline_is_looked_at_as_it_is_turned_by_planners_that_turn_it() -> None:
+def test_planners_of_headings_check_an_outline_at_its_yaw() -> None:
     route = plan(beside_a_wall(0.0), "hybrid_astar")
     assert route.length == pytest.approx(31.0)
     with pytest.raises(NonFreeError, match=r"start \(9.00, 10.80\): the footprint \(radius 2.57"):
         plan(beside_a_wall(0.0), "astar")
 
 
-def test_an_outline_that_does_not_fit_as_it_is_turned_is_named_with_its_yaw() -> None:
-    sentence = r"start \(9.00, 10.80\): the footprint, turned by -1.57 rad, overlaps non-free"
+def test_an_outline_that_does_not_fit_at_its_yaw_is_reported_with_the_yaw() -> None:
+    sentence = r"start \(9.00, 10.80\): the footprint \(at yaw -1.57 rad\) overlaps non-free"
     with pytest.raises(NonFreeError, match=sentence) as caught:
         plan(beside_a_wall(-np.pi / 2), "hybrid_astar")
     assert caught.value.nearest == (8.5, 12.5)

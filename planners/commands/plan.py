@@ -20,7 +20,8 @@ from planners.planning import plan
 from planners.problem.costs import CostSettings
 from planners.problem.problem import PLAIN, PlanningProblem, Unknown
 from planners.registry import OWN_PLANNERS, get_planner
-from planners.route.route import Route, check_route_file
+from planners.route.route import Route
+from planners.route.route_files import format_of
 from planners.route.shortcut import shortcut
 from planners.route.smooth import smooth
 
@@ -108,7 +109,7 @@ def plan_command(
 ) -> None:
     """Plan a collision-free route on a map."""
     if out is not None:
-        check_route_file(out)
+        format_of(out)
         check_writable(out, sources=files_of(map_file))
     if plot is not None:
         check_picture(plot, sources=files_of(map_file))

@@ -1,1 +1,1 @@
-"""The map as a problem sees it: where the footprint fits, and what cells cost."""
+"""The map of a problem: where the footprint fits, and the costs of cells."""

@@ -1,4 +1,4 @@
-"""What can be driven on, and what it costs: a pure function of the map and the problem."""
+"""Which cells are traversable, and their costs: a pure function of map and problem."""
 
 from __future__ import annotations
 
@@ -9,42 +9,39 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import Bools, Bytes, Floats, Ints, Ints32
+from groundmap.arrays import Bools, Bytes, Ints, Ints32
 from groundmap.grid.window import GridWindow
 from planners.costmap.extent import padded_window
-from planners.costmap.kernels.distance import NOWHERE, squared_distances
 from planners.costmap.kernels.moves import DIAGONAL, ONE
-from planners.costmap.layers import Layers, cap, layers_of, metres
-from planners.costmap.moves import allowed_moves, squared_need
+from planners.costmap.layers import Layers, cap, layers_of
+from planners.costmap.map_space import MapSpace
+from planners.costmap.moves import allowed_moves
 from planners.errors import ProblemError
-from planners.geometry.kernels.clearance import line_clearance
-from planners.geometry.rounding import slack_at
 from planners.problem.costs import MAX_NON_OBSTACLE
 from planners.problem.problem import PlanningProblem
 
-FIRST_REACH = 64  # [cells] around cells in which blocked ones are looked for at first
-MOST_COST = 2**30  # [cells] of a route: as much again is left for estimates and their weights
+MOST_COST = 2**30  # [cells] of a route: leaves the same range for weighted estimates
 
 
 @dataclass(frozen=True, eq=False)
-class Costmap:
-    """Which cells are blocked, where the footprint's centre may be, and what that costs.
+class Costmap(MapSpace):
+    """Which cells are blocked, where the footprint's centre may be, and at which cost.
 
     Attributes
     ----------
     problem : PlanningProblem
     window : GridWindow
-        The touched tiles, and a ring of unknown cells around them and around the cleared start:
-        the nearest of all that is unknown outside.
+        The observed tiles, surrounded by a ring of unknown cells that also encloses the cleared
+        start. The ring stands for all unknown space outside.
     blocked, nonfree, cleared : ndarray of bool, shape (rows, cols)
         Cells that the footprint may not touch; those among them that are non-free; unknown cells
         that count as free because they are near the start.
     squared : ndarray of int32, shape (rows, cols) [(half cells)²]
-        Squared distance from cell centres to the nearest blocked square, up to what matters: the
+        Squared distance from cell centres to the nearest blocked square, cut to the larger of the
         footprint's radius and the inflation radius.
     costs : ndarray of uint8, shape (rows, cols)
-        On Nav2's scale: 0 to 252 where the footprint's centre may be, 253 where it would touch
-        what is blocked, 254 on non-free cells, 255 on other blocked ones.
+        On Nav2's scale: 0 to 252 on traversable cells, 253 where the footprint would touch a
+        blocked cell, 254 on non-free cells, 255 on other blocked ones.
 
     Examples
     --------
@@ -57,42 +54,44 @@ class Costmap:
     ((68, 68), 31.5, [255, 255, 253, 0, 0])
     """
 
-    problem: PlanningProblem
-    window: GridWindow
-    blocked: Bools
-    nonfree: Bools
-    cleared: Bools
     squared: Ints32
     costs: Bytes
 
     @classmethod
     def of(cls, problem: PlanningProblem) -> Costmap:
-        """Return the costmap of a problem whose start is on the map."""
+        """Return the costmap of a problem on a 2-D map whose start is on the map.
+
+        Raises
+        ------
+        ProblemError
+            A 3-D map, or one with too many cells.
+        """
+        problem.check_dimensions(2)
         window = padded_window(problem)
         return cls(problem, window, *layers_of(problem, window))
 
     def with_changes(self, changed: npt.ArrayLike) -> Costmap:
         """Return the costmap after cells of its map have changed.
 
-        Only what they touch is worked out again: the cells themselves, and the distances and
-        costs of cells within reach of the footprint's and the inflation radius.
+        Only the affected part is updated: the cells themselves, and the distances and costs of
+        cells within the footprint's and the inflation radius.
 
         Parameters
         ----------
         changed : array_like of int, shape (n, 2)
-            Cells [row, col] of the grid whose confidence, count or drop-offs changed. Where the
-            map has grown since, everything is worked out.
+            Cells [row, col] of the grid whose confidence, count or drop-offs changed. If the map
+            has grown since, the whole costmap is computed.
 
         Raises
         ------
         ProblemError
-            Cells of another shape, or not of whole numbers.
+            An array of another shape, or not of integers.
         """
         cells = whole_cells(changed) - self.lower_cell
         if len(cells) == 0:
             return self
         shape = np.array(self.blocked.shape)
-        # The ring of a cell and a half around the map: what grew touches it, or lies beyond.
+        # Cells in the ring around the map, or outside it, mean that the map has grown.
         tiles = np.array(self.problem.grid.cell_bounds()) - self.lower_cell
         reached = np.concatenate([cells, tiles - [[0], [1]]])
         if (reached < 1).any() or (reached >= shape - 1).any():
@@ -109,22 +108,12 @@ class Costmap:
         return Costmap(self.problem, _patch(self.window, part, _slices(*outer)), **renewed)
 
     def _read(self, first: Ints, last: Ints) -> GridWindow:
-        """Return cells of the map as they are now, from [row, col] `first` up to `last`."""
+        """Return the current cells of the map from [row, col] `first` up to `last`."""
         size = self.window.resolution
         low, high = first[::-1] + 0.5, last[::-1] - 0.5
         return self.problem.grid.window(
             np.concatenate([self.window.origin + low * size, self.window.origin + high * size])
         )
-
-    @property
-    def radius(self) -> float:
-        """Distance that the footprint's centre keeps from what is blocked [m]."""
-        return self.problem.radius
-
-    @property
-    def slack(self) -> float:
-        """Shortfall of the radius that is put down to rounding, on lines from start to goal [m]."""
-        return slack_at(self.problem.start_xy, self.problem.goal_xy)
 
     @property
     def width(self) -> int:
@@ -140,25 +129,25 @@ class Costmap:
 
     @property
     def top(self) -> float:
-        """What a metre in a cell of cost 252 costs beyond its length [m/m]."""
+        """Extra cost of a metre in a cell of cost 252 [m/m]."""
         return self.problem.costs.top(penalise=self.problem.unknown == "penalise")
 
     @property
     def uniform(self) -> bool:
-        """Whether every metre costs the same."""
+        """Whether all cells have the same cost."""
         return self.top == 0.0
 
     @cached_property
     def steps(self) -> Ints:
-        """Costs of moves by the sum of their two cells' costs, shape (2, 505).
+        """Costs of moves, indexed by the sum of the costs of their two cells, shape (2, 505).
 
-        The first row holds orthogonal moves, the second diagonal ones, in units of `ONE` a cell's
-        side. Each half of a move is as dear as the cell it is in: both directions cost the same.
+        The first row holds orthogonal moves, the second diagonal ones; `ONE` is the side of a
+        cell. Each half of a move is weighted by its own cell, so both directions cost the same.
 
         Raises
         ------
         ProblemError
-            A route could cost more than the integers of a search can hold.
+            The cost of a route could exceed the integer range of a search.
         """
         self._check_sums()
         factors = 1.0 + self.top * np.arange(2 * MAX_NON_OBSTACLE + 1) / (2.0 * MAX_NON_OBSTACLE)
@@ -168,7 +157,7 @@ class Costmap:
     def _check_sums(self) -> None:
         """Check that no route can cost more than `MOST_COST`.
 
-        A route visits a cell once, by two halves of moves that are as dear as the cell.
+        A route visits a cell once, with two halves of moves that are weighted by the cell.
         """
         most = MOST_COST * ONE / DIAGONAL
         if self.traversable.size * (1.0 + self.top) <= most:
@@ -179,10 +168,9 @@ class Costmap:
         if total > most:
             raise ProblemError(
                 "costs",
-                f"weights with which the {counts.sum()} free cells cost as much as {most:.3g} "
-                "plain ones at most",
+                f"a total cost of the {counts.sum()} traversable cells of at most {most:.3g}",
                 f"{total:.3g}",
-                hint="Give smaller weights, or map with larger cells.",
+                hint="Use smaller weights, or a map with larger cells.",
             )
 
     @cached_property
@@ -192,73 +180,19 @@ class Costmap:
 
     @cached_property
     def moves(self) -> Bytes:
-        """Allowed moves between such cells, a bit each, shape (rows, cols)."""
+        """Allowed moves between traversable cells as bits, shape (rows, cols)."""
         return allowed_moves(self.traversable)
-
-    @cached_property
-    def all_squared(self) -> Ints32:
-        """As `squared`, however far, shape (rows, cols) [(half cells)²]."""
-        return squared_distances(self.blocked, NOWHERE)
-
-    @cached_property
-    def clearance(self) -> Floats:
-        """Distance from cell centres to the nearest blocked square, shape (rows, cols) [m]."""
-        return metres(self.all_squared, self.window.resolution)
-
-    def traversable_for(self, radius: float) -> Bools:
-        """Return where the centre of a disc of another radius [m] may be, shape (rows, cols)."""
-        return ~self.blocked & (self.all_squared >= squared_need(radius, self.window.resolution))
-
-    def clearance_at(self, cells: Ints) -> Floats:
-        """Return the clearance of cell centres [row, col], shape (n,) [m]."""
-        known = "all_squared" in vars(self)
-        squared = self.all_squared[tuple(cells.T)] if known else self._squared_at(cells)
-        return metres(squared, self.window.resolution)
-
-    def _squared_at(self, cells: Ints) -> Ints32:
-        """Return `all_squared` at cells, worked out around them only as far as that is needed."""
-        first, last, reach = cells.min(axis=0), cells.max(axis=0) + 1, FIRST_REACH
-        while True:
-            low = np.maximum(first - reach, 0)
-            high = np.minimum(last + reach, self.blocked.shape)
-            part = squared_distances(self.blocked[_slices(low, high)], NOWHERE)
-            squared: Ints32 = part[tuple((cells - low).T)]
-            # What is left out begins more than `reach` cells away from all of the cells.
-            if squared.max() <= (2 * reach) ** 2 or part.shape == self.blocked.shape:
-                return squared
-            reach *= 4
-
-    def to_cells(self, points: npt.ArrayLike) -> Floats:
-        """Return positions [m, map] in cells from the window's outer corner, shape (n, 2)."""
-        shifted: Floats = np.atleast_2d(np.asarray(points, dtype=np.float64)) - self.window.origin
-        return shifted / self.window.resolution
-
-    def clearance_of(
-        self, points: npt.ArrayLike, *, to: Bools | None = None, limit: float = math.inf
-    ) -> float:
-        """Return the exact distance of a point or a polyline to the nearest blocked square [m].
-
-        Parameters
-        ----------
-        points : array_like, shape (2,) or (n, 2) [m, map]
-        to : ndarray of bool, shape (rows, cols), optional
-            Other cells than the blocked ones.
-        limit : float, default inf [m]
-            Nothing farther away is looked for.
-        """
-        mask, size = self.blocked if to is None else to, self.window.resolution
-        return line_clearance(mask, self.to_cells(points), limit / size) * size
 
 
 def whole_cells(changed: npt.ArrayLike) -> Ints:
-    """Return cells [row, col], shape (n, 2).
+    """Return cells [row, col] as an integer array, shape (n, 2).
 
     Raises
     ------
     ProblemError
-        Another shape, or not whole numbers.
+        Another shape, or not integers.
     """
-    expected = "whole numbers [row, col], shape (n, 2)"
+    expected = "integers [row, col], shape (n, 2)"
     try:
         cells = np.asarray(changed)
     except ValueError as error:
@@ -277,7 +211,7 @@ def _slices(first: Ints, last: Ints) -> tuple[slice, slice]:
 
 
 def _patch(window: GridWindow, part: GridWindow, box: tuple[slice, slice]) -> GridWindow:
-    """Return a copy of a window with a part of it replaced."""
+    """Return a copy of a window in which a part is replaced."""
     names = ("confidence", "count", "drop_offs")
     arrays = {name: getattr(window, name).copy() for name in names}
     for name in names:

@@ -1,4 +1,4 @@
-"""Whether start and goal are places for the footprint."""
+"""Whether the footprint fits at start and goal."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ from planners.geometry.kernels.swept_footprint import pose_clear
 from planners.geometry.rounding import rounding_at, slack_at
 from planners.problem.problem import PlanningProblem, Pose
 
-MOST_LOOKUPS = 64  # tiles near a place beyond which all touched tiles are looked at instead
+SPACES: dict[int, type[Costmap | Voxels]] = {2: Costmap, 3: Voxels}  # by dimension of the map
+MOST_LOOKUPS = 64  # tiles near a place above which all observed tiles are searched instead
 
 
 def costmap_of(problem: PlanningProblem) -> Costmap:
-    """Return the costmap of a problem on a 2-D map whose start and goal are places for its disc.
+    """Return the costmap of a problem on a 2-D map after checking that its disc fits at both ends.
 
     Raises
     ------
@@ -33,8 +34,7 @@ def costmap_of(problem: PlanningProblem) -> Costmap:
         A 3-D map.
     OutsideMapError, NonFreeError, UnknownSpaceError
     """
-    if problem.grid.ndim != 2:
-        raise ProblemError("grid", "a 2-D map", f"one of {problem.grid.ndim}-D")
+    problem.check_dimensions(2)
     check_on_map(problem)
     costmap = Costmap.of(problem)
     check_space(costmap, "start", problem.start_xy)
@@ -43,10 +43,16 @@ def costmap_of(problem: PlanningProblem) -> Costmap:
 
 
 def check_on_map(problem: PlanningProblem, *, goal: bool = True) -> None:
-    """Check that start and, unless told, goal lie on touched tiles.
+    """Check that start and goal lie on observed tiles.
 
-    A start whose surroundings are cleared may stand beside them, as long as its footprint (or a
-    cell) reaches them: poses at the border of a tile are off by rounding.
+    A start whose surroundings are cleared may lie beside them if its footprint (or a cell) reaches
+    them: poses at the border of a tile have rounding errors.
+
+    Parameters
+    ----------
+    problem : PlanningProblem
+    goal : bool, default True
+        Whether the goal is checked.
 
     Raises
     ------
@@ -68,23 +74,23 @@ def check_on_map(problem: PlanningProblem, *, goal: bool = True) -> None:
 
 
 def check_space(space: MapSpace, place: Place, pose: Pose, *, headings: bool = False) -> None:
-    """Check that the footprint fits: the state of the place itself comes before what is near.
+    """Check that the footprint fits; the state of the place itself takes precedence.
 
     Parameters
     ----------
     space : Costmap or Voxels
     place : {"start", "goal"}
-        For the sentence.
+        Name of the place in the message.
     pose : tuple of float
         x, y (in 3-D: x, y, z) [m, map] and, if `headings`, yaw [rad].
     headings : bool, default False
-        Whether an outline is looked at as it is turned, or the disc around it.
+        Whether an outline is checked at its yaw, instead of the disc around it.
 
     Raises
     ------
     NonFreeError, UnknownSpaceError
     ProblemError
-        A place beyond the part of a large map that is planned on.
+        A place outside the part of a large map that is planned on.
     """
     xy, yaw = _place_and_yaw(space, pose, headings=headings)
     _check_in_window(space, place, xy)
@@ -108,10 +114,10 @@ def check_space(space: MapSpace, place: Place, pose: Pose, *, headings: bool = F
 
 
 def check_start_is_known(space: MapSpace) -> None:
-    """Check that the start, from which no route was found, is no island in unknown space.
+    """Check that the start, from which no route was found, is not an island in unknown space.
 
-    The unknown cells near the start count as free. Where unknown cells alone keep even a point in
-    there, the start lies in unknown space, and is not fenced in.
+    Unknown cells near the start count as free. If other unknown cells enclose these for a point,
+    the start is in unknown space and not enclosed by obstacles.
 
     Parameters
     ----------
@@ -142,26 +148,25 @@ def nearest_place(
 ) -> Point | None:
     """Return the cell centre nearest to a place where the footprint fits, or None [m, map].
 
-    It is one from which one gets somewhere. Of places for a start, only those count from which
-    the goal can be reached, and the reverse. Where the other end is in no place for the footprint
-    itself, or joined to no cell, only those in the largest connected part of the map count: a
-    problem whose start and goal are both replaced by their nearest places has a route.
+    For a start, only centres from which the goal can be reached are considered, and vice versa. If
+    the other end is linked to no cell, only the largest connected region of the map is considered.
+    A problem whose start and goal are both replaced by their nearest positions has a route.
 
     Parameters
     ----------
     space : Costmap or Voxels
     xy : tuple of float [m, map]
     place : {"start", "goal"}
-        Which end of the problem the place is.
+        The end of the problem at the place.
     yaw : float, optional [rad]
-        The outline fits that is turned so; unless given, the disc around it. Which places an
-        outline can drive between isn't worked out: those count that base_link can.
+        Heading at which the outline has to fit; default: the disc around it has to fit. For an
+        outline, regions are those that base_link alone can move in.
     """
     problem = space.problem
     free = space.traversable if yaw is None else ~space.blocked
     other = problem.goal_xy if place == "start" else problem.start_xy
     radius = space.radius if yaw is None else 0.0
-    cells = np.argwhere(_part_around(space, free, other, radius=radius))
+    cells = np.argwhere(region_around(space, free, other, radius=radius, or_largest=True))
     centres: Floats = space.window.cell_to_world(cells)
     away = np.hypot.reduce(centres - xy, axis=1)
     if yaw is None:
@@ -173,24 +178,37 @@ def nearest_place(
     return None
 
 
-def _part_around(space: MapSpace, free: Bools, xy: Point, *, radius: float) -> Bools:
-    """Return the cells that are connected to a place; if there are none, the largest part.
+def region_around(
+    space: MapSpace, free: Bools, xy: Point, *, radius: float, or_largest: bool = False
+) -> Bools:
+    """Return the cells that are connected to a place.
 
-    Moves lead over the sides of cells, as all cells that a diagonal move spans are free.
+    Moves pass through the sides of cells, as a diagonal move requires all cells that it spans.
+
+    Parameters
+    ----------
+    space : Costmap or Voxels
+    free : ndarray of bool, shape as `space.blocked`
+        Cells that may be visited.
+    xy : tuple of float [m, map]
+    radius : float [m]
+        Clearance on the way to the cells around the place.
+    or_largest : bool, default False
+        Whether to return the largest region if the place is connected to no cell.
     """
     parts, count = ndimage.label(free)
     around = np.unique(parts[tuple(_cells_around(space, xy, radius=radius).T)])
     around = around[around > 0]
-    if len(around) == 0 and count > 0:
+    if or_largest and len(around) == 0 and count > 0:
         around = np.array([1 + np.bincount(parts.ravel())[1:].argmax()])
-    part: Bools = np.isin(parts, around)
-    return part
+    region: Bools = np.isin(parts, around)
+    return region
 
 
 def _cells_around(space: MapSpace, xy: Point, *, radius: float) -> Ints:
-    """Return the cells that a disc's place is joined to; of a ball's on voxels, those around it."""
+    """Return the cells that a place is connected to; on voxels, the up to eight around it."""
     if isinstance(space, Costmap):
-        return links(space, (xy[0], xy[1]), radius=radius).cells
+        return links(space, xy, radius=radius).cells
     position = space.to_cells(xy)[0][::-1]
     around = product(*(centres_around(at, 0.0) for at in position.tolist()))
     cells = np.array(list(around), dtype=np.int64)
@@ -203,9 +221,9 @@ def _check_in_window(space: MapSpace, place: Place, xy: Point) -> None:
     if not window.contains(window.world_to_cell(xy))[0]:
         raise ProblemError(
             place,
-            "a place on the part of the map that is planned on, as the whole has too many cells",
+            "a place on the part of the map that is planned on, as the map has too many cells",
             format_point(xy),
-            hint="Plan to and from other parts on their own.",
+            hint="Plan on the parts of the map separately.",
         )
 
 
@@ -229,12 +247,12 @@ def _fits(space: MapSpace, blocked: Bools, xy: Point, yaw: float | None) -> bool
 
 
 def space_of(problem: PlanningProblem) -> Costmap | Voxels:
-    """Return the map as a problem sees it: a costmap, or voxels."""
-    return Costmap.of(problem) if problem.grid.ndim == 2 else Voxels.of(problem)
+    """Return the costmap of a problem, or the voxels on a 3-D map."""
+    return SPACES[problem.grid.ndim].of(problem)
 
 
 def _touches_tile(problem: PlanningProblem, xy: Point, margin: float) -> bool:
-    """Whether a touched tile comes within a margin [m] of a place, up to rounding."""
+    """Whether an observed tile comes within a margin [m] of a place, up to rounding."""
     grid = problem.grid
     side = grid.tile_shape[0] * grid.resolution
     position = ((np.array(xy) - grid.origin) / side)[::-1]

@@ -1,4 +1,4 @@
-"""How start and goal are joined to the cells around them, and the line between these."""
+"""How start and goal are linked to the cells around them."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from planners.problem.costs import MAX_NON_OBSTACLE
 
 
 class Links(NamedTuple):
-    """The cells that a place is joined to."""
+    """The cells that a place is linked to."""
 
     cells: Ints  #: shape (n, 2): row, column
     lengths: Floats  #: shape (n,) [m]
 
 
 def links(costmap: Costmap, xy: Point, *, radius: float) -> Links:
-    """Return the pieces from a place to the up to four cell centres around it.
+    """Return the straight links from a place to the up to four cell centres around it.
 
-    As for moves, a piece must keep its clearance exactly, and cut no corner: the cells of the
-    block that its ends span are not blocked.
+    Like a move, a link keeps its clearance exactly and cuts no corner: none of the cells of the
+    block that its ends span is blocked.
 
     Parameters
     ----------
@@ -54,12 +54,13 @@ def links(costmap: Costmap, xy: Point, *, radius: float) -> Links:
 
 
 def centres_around(position: float, near: float) -> range:
-    """Return the cells along an axis between whose centres a position lies: one or two.
+    """Return the one or two cells along an axis whose centres enclose a position.
 
     Parameters
     ----------
-    position, near : float [cells]
-        A position this near to a centre is at it.
+    position : float [cells]
+    near : float [cells]
+        A position at most this far from a centre coincides with it.
 
     Examples
     --------
@@ -70,9 +71,14 @@ def centres_around(position: float, near: float) -> range:
 
 
 def is_clear(costmap: Costmap, a: Point, b: Point, *, radius: float) -> bool:
-    """Whether the straight piece a-b [cells], within two by two cells, can be driven.
+    """Whether the straight piece a-b is within two by two cells and keeps a clearance.
 
-    The radius [m] is kept to the last bit: what is put down to rounding is up to the caller.
+    Parameters
+    ----------
+    costmap : Costmap
+    a, b : tuple of float, x and y [cells]
+    radius : float [m]
+        Clearance, without any tolerance for rounding.
     """
     low, left = math.floor(min(a[1], b[1])), math.floor(min(a[0], b[0]))
     high, right = math.floor(max(a[1], b[1])), math.floor(max(a[0], b[0]))
@@ -87,25 +93,25 @@ def is_clear(costmap: Costmap, a: Point, b: Point, *, radius: float) -> bool:
 
 
 class Ends(NamedTuple):
-    """Where searches begin and end.
+    """The cells at which searches begin and end.
 
-    Where start or goal is joined to no cell, no cell-to-cell route exists: then both sources and
-    targets are empty, and a search that begins with the sources ends at once.
+    If start or goal is linked to no cell, no cell-to-cell route exists. Sources and targets are
+    then both empty, so that the search ends immediately.
     """
 
     sources: Ints  #: shape (n, 3): row, column, cost from the start
     targets: Ints  #: shape (m, 3): row, column, cost to the goal
-    direct: bool  #: the straight piece from start to goal, within two by two cells, is the best
+    direct: bool  #: the straight piece from start to goal is clear and thus the best route
 
 
 def ends_of(costmap: Costmap, start: tuple[float, ...], goal: tuple[float, ...]) -> Ends:
-    """Return the cells that start and goal are joined to.
+    """Return the cells that start and goal are linked to.
 
     Parameters
     ----------
     costmap : Costmap
     start, goal : tuple of float
-        x and y [m, map]; what follows is ignored.
+        x and y [m, map]; a yaw is ignored.
     """
     (ax, ay), (bx, by) = costmap.to_cells([start[:2], goal[:2]]).tolist()
     radius = costmap.radius
@@ -131,17 +137,17 @@ def waypoints_through(
     ----------
     costmap : Costmap
     start, goal : tuple of float
-        x and y [m, map]; what follows is ignored.
+        x and y [m, map]; a yaw is ignored.
     cells : ndarray of int64, shape (k, 2)
-        Row and column of the cells where the line begins, turns and ends, in order; may be empty.
+        Row and column of the cells where the line begins, turns and ends, in order; can be empty.
     """
     centres = costmap.window.cell_to_world(cells.reshape(-1, 2))
     return merge_collinear(np.concatenate([[start[:2]], centres, [goal[:2]]]))
 
 
 def _with_costs(costmap: Costmap, joined: Links) -> Ints:
-    """Return row, column and cost: the length, as dear as the cell it leads to."""
-    # Up to rounding, a piece may keep a distance that its cell, to the last bit, doesn't.
+    """Return row, column and cost of links: their lengths, weighted by the cost of their cell."""
+    # Within the tolerance, a link may keep a clearance that the centre of its cell does not keep.
     on = costmap.traversable[tuple(joined.cells.T)]
     joined = Links(joined.cells[on], joined.lengths[on])
     extra = costmap.costs[tuple(joined.cells.T)] * (costmap.top / MAX_NON_OBSTACLE)

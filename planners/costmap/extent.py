@@ -1,4 +1,4 @@
-"""Which box of the map a problem is planned on."""
+"""The part of the map that a problem is planned on."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from groundmap.grid.window import GridWindow
 from planners.errors import ProblemError
 from planners.problem.problem import PlanningProblem
 
-MOST_CELLS = 2**25  # of a costmap: what is held of it takes about 50 bytes for each
+MOST_CELLS = 2**25  # of a costmap, which takes about 50 bytes per cell
 
 
 class _Tiles(NamedTuple):
-    """The touched tiles."""
+    """The observed tiles."""
 
     lower: Floats  #: shape (n, d) [m, map]: lower corners
     upper: Floats  #: shape (n, d) [m, map]: upper corners
-    part: Ints32  #: shape (n,): tiles that touch, if only in a corner, are in one part
+    part: Ints32  #: shape (n,): label of the connected part; tiles connect over sides and corners
 
 
 def padded_window(problem: PlanningProblem) -> GridWindow:
-    """Return the cells that a problem is planned on, in 2-D or 3-D.
+    """Return the cells that a problem is planned on, in any dimension.
 
     Raises
     ------
@@ -39,10 +39,10 @@ def padded_window(problem: PlanningProblem) -> GridWindow:
 def padded_bounds(problem: PlanningProblem) -> Floats:
     """Return the box of `padded_window`: lower then upper corner [m, map].
 
-    It holds the touched tiles, the cleared start, and a ring of cells around them. Where the tiles
-    span too many cells and unknown cells can't be crossed, it holds only those tiles that may be
-    reached from the start or the goal: a tile far from all others, such as a single wrong pose
-    leaves it, doesn't stop the planner.
+    It holds the observed tiles, the cleared start, and a ring of cells around them. If the tiles
+    span too many cells and unknown cells are not traversable, it holds only the tiles that may be
+    reachable from the start or the goal, so that a distant tile from a single wrong pose does not
+    prevent planning.
 
     Raises
     ------
@@ -58,22 +58,22 @@ def padded_bounds(problem: PlanningProblem) -> Floats:
     if cells > MOST_CELLS:
         raise ProblemError(
             "footprint" if problem.cleared_at is None else "cleared_at",
-            f"one that leaves {MOST_CELLS} cells of map and cleared start at most",
-            f"{problem.clear_radius:g} m around {problem.clear_place}, which makes {cells:.3g}",
-            hint="Give a smaller footprint or clear_start_radius, or map with larger cells.",
+            f"at most {MOST_CELLS} cells in the box around the map and the cleared start",
+            f"{cells:.3g}, with {problem.clear_radius:g} m cleared around {problem.clear_place}",
+            hint="Use a smaller footprint or clear_start_radius, or a map with larger cells.",
         )
-    # One cell and a half: borders that rounding moves by a cell must not swallow the ring.
+    # One and a half cells, so that rounding of the borders can't remove the ring.
     ring = 1.5 * problem.grid.resolution
     return np.concatenate([lower - ring, upper + ring])
 
 
 def _cells(problem: PlanningProblem, lower: Floats, upper: Floats) -> float:
-    """Return how many cells a box holds."""
+    """Return the number of cells in a box."""
     return float(np.prod((upper - lower) / problem.grid.resolution))
 
 
 def _tiles_box(problem: PlanningProblem) -> tuple[Floats, Floats]:
-    """Return the corners of the box around the touched tiles, or around those that can matter."""
+    """Return the corners of the box around the observed tiles, or around the reachable ones."""
     lower, upper = problem.grid.bounds().reshape(2, -1)
     if _cells(problem, lower, upper) <= MOST_CELLS:
         return lower, upper
@@ -85,9 +85,9 @@ def _tiles_box(problem: PlanningProblem) -> tuple[Floats, Floats]:
             return lower, upper
     raise ProblemError(
         "grid",
-        f"a box of {MOST_CELLS} cells around the touched tiles at most",
+        f"at most {MOST_CELLS} cells in the box around the observed tiles",
         f"{_cells(problem, lower, upper):.3g}{_far_tiles(tiles)}",
-        hint="Map with larger cells.",
+        hint="Use a map with larger cells.",
     )
 
 
@@ -103,10 +103,10 @@ def _tiles(problem: PlanningProblem) -> _Tiles:
 
 
 def _reached(problem: PlanningProblem, tiles: _Tiles) -> Bools:
-    """Return which tiles are in a part that start, goal or the cleared cells touch.
+    """Return which tiles belong to a part that contains start, goal or cleared cells.
 
-    Where unknown cells can't be crossed, no route from the start to the goal leaves these parts:
-    between two parts there are unknown cells only.
+    If unknown cells are not traversable, no route leaves these parts, as all cells between two
+    parts are unknown.
     """
     cell = problem.grid.resolution
     cleared = problem.clear_radius + cell if problem.clear_start else 0.0
@@ -120,7 +120,7 @@ def _reached(problem: PlanningProblem, tiles: _Tiles) -> Bools:
 
 
 def _far_tiles(tiles: _Tiles) -> str:
-    """Return a clause on the part that is farthest from the largest one; nothing of one part."""
+    """Return a clause on the part farthest from the largest one; "" if there is one part."""
     sizes = np.bincount(tiles.part)
     if len(sizes) == 1:
         return ""
@@ -134,5 +134,5 @@ def _far_tiles(tiles: _Tiles) -> str:
     return (
         f": {count} of {len(tiles.part)} tiles, around ({place}), "
         f"{'lies' if count == 1 else 'lie'} {away[far]:.0f} m from the largest part; "
-        "a pose may be wrong there"
+        "its poses may be wrong"
     )

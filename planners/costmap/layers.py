@@ -1,4 +1,4 @@
-"""What the cells of a window are to a problem: blocked, how far from that, how dear."""
+"""Per-cell masks, distances and costs."""
 
 from __future__ import annotations
 
@@ -20,8 +20,17 @@ from planners.problem.costs import (
 from planners.problem.problem import PlanningProblem
 
 
+class Occupancy(NamedTuple):
+    """Masks of the cells of a map of any dimension, see `planners.costmap.map_space.MapSpace`."""
+
+    blocked: Bools
+    nonfree: Bools
+    cleared: Bools
+    free: Bools  #: free cells and cleared ones
+
+
 class Layers(NamedTuple):
-    """Arrays of shape (rows, cols), described at `planners.costmap.costmap.Costmap`."""
+    """Arrays of shape (rows, cols), see `planners.costmap.costmap.Costmap`."""
 
     blocked: Bools
     nonfree: Bools
@@ -30,13 +39,32 @@ class Layers(NamedTuple):
     costs: Bytes
 
 
-def layers_of(problem: PlanningProblem, window: GridWindow) -> Layers:
-    """Return the layers of a window; what lies outside it counts as not blocked."""
+def occupancy_of(problem: PlanningProblem, window: GridWindow) -> Occupancy:
+    """Return which cells of a window the footprint must not touch.
+
+    Parameters
+    ----------
+    problem : PlanningProblem
+    window : GridWindow
+        In any dimension.
+    """
     states = window.states(epsilon=problem.epsilon)
     nonfree = states == CellState.NONFREE
-    cleared = near_start(problem, window) & (states == CellState.UNKNOWN)
+    cleared = _near_start(problem, window) & (states == CellState.UNKNOWN)
     free = (states == CellState.FREE) | cleared
-    blocked = ~free if problem.avoids_unknown else nonfree
+    return Occupancy(~free if problem.avoids_unknown else nonfree, nonfree, cleared, free)
+
+
+def layers_of(problem: PlanningProblem, window: GridWindow) -> Layers:
+    """Return the layers of a window; everything outside it counts as not blocked.
+
+    Parameters
+    ----------
+    problem : PlanningProblem
+    window : GridWindow
+        In 2-D.
+    """
+    blocked, nonfree, cleared, free = occupancy_of(problem, window)
     squared = squared_distances(blocked, cap(problem))
     costs = np.zeros(squared.shape, dtype=np.uint8)
     penalise = problem.unknown == "penalise"
@@ -56,18 +84,24 @@ def layers_of(problem: PlanningProblem, window: GridWindow) -> Layers:
 
 
 def cap(problem: PlanningProblem) -> int:
-    """Return the squared distance beyond which nothing changes [(half cells)²]."""
+    """Return the squared distance beyond which no layer depends on it [(half cells)²]."""
     farthest = max(problem.radius, problem.costs.reach)
     return min(squared_need(farthest, problem.grid.resolution), NOWHERE)
 
 
 def metres(squared: Ints32, resolution: float) -> Floats:
-    """Return distances [m] of squared ones in half cells."""
+    """Return distances in metres.
+
+    Parameters
+    ----------
+    squared : ndarray of int32 [(half cells)²]
+    resolution : float [m]
+    """
     return np.where(squared == NOWHERE, np.inf, np.sqrt(squared) * (resolution / 2.0))
 
 
-def near_start(problem: PlanningProblem, window: GridWindow) -> Bools:
-    """Return which cells' squares (cubes) come within the clear radius of the cleared place."""
+def _near_start(problem: PlanningProblem, window: GridWindow) -> Bools:
+    """Return the cells whose square or cube comes within the clear radius of the cleared place."""
     near = np.zeros(window.count.shape, dtype=np.bool_)
     if not problem.clear_start:
         return near

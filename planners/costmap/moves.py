@@ -1,17 +1,17 @@
-"""The half-cell lattice: what exact clearance is on it, and the moves it allows.
+"""The half-cell lattice: exact clearance on it, and the moves that it allows.
 
 The lattice of a map of r x c cells has (2 r + 1) x (2 c + 1) points: the corners, edge midpoints
 and centres of the cells; the centre of cell [row, col] is point [2 row + 1, 2 col + 1]. A blocked
-cell's closed square marks its 3 x 3 points. The point of a square that is nearest to a lattice
-point is a lattice point again (clamp each coordinate), so a distance transform of the lattice
-gives distances to *squares*, squared and in half cells exact integers.
+cell's closed square covers 3 x 3 points. The point of a square that is nearest to a lattice point
+is also a lattice point (clamp each coordinate), so a distance transform of the lattice gives
+distances to *squares*, whose squares in half cells are exact integers.
 
-A disc whose centre keeps its radius at the ends of a move keeps it all along. Take a square S and
-the block of cells that the move spans: two cells, or, for a diagonal, four whose centres all keep
-the radius. These centres span a segment, or a square; of its points, the nearest to S is a corner,
-or it lies beside S, as some corner does at the same distance, since S is aligned with the cells.
-(An S within the block is one of its cells, on whose centre nobody may be.) So the cells on which
-the centre may be are a bitmap that says all about moves.
+A disc whose centre keeps its radius at the ends of a move keeps it along the whole move. Take a
+blocked square S and the block of cells that the move spans: two cells, or four for a diagonal,
+whose centres all keep the radius. These centres span a segment or a square. Its point nearest to S
+is a corner, or lies beside S at the same distance as a corner, because S is aligned with the cells.
+(S is not within the block, as the centres of blocked cells do not keep the radius.) Therefore the
+bitmap of traversable cells determines all moves.
 """
 
 from __future__ import annotations
@@ -22,11 +22,15 @@ import numpy as np
 
 from groundmap.arrays import Bools, Bytes
 
-RADIUS_TOLERANCE = 1e-12  # relative error granted to the radius: 2 * 0.3 / 0.1 is not quite 6
+RADIUS_TOLERANCE = 1e-12  # relative tolerance of the radius: 2 * 0.3 / 0.1 is slightly below 6
 
 
 def squared_need(radius: float, resolution: float) -> int:
-    """Return the least squared clearance [(half cells)²] that is enough for a radius [m].
+    """Return the smallest squared clearance that suffices for a radius [(half cells)²].
+
+    Parameters
+    ----------
+    radius, resolution : float [m]
 
     Examples
     --------
@@ -37,10 +41,10 @@ def squared_need(radius: float, resolution: float) -> int:
 
 
 def allowed_moves(traversable: Bools) -> Bytes:
-    """Return the allowed moves of every cell, a bit each, as in `planners.costmap.kernels.moves`.
+    """Return the allowed moves of every cell as bits, see `planners.costmap.kernels.moves`.
 
-    An orthogonal move is allowed between two cells on which the footprint's centre may be, a
-    diagonal one if that holds for all four cells of the block: no corner is cut.
+    An orthogonal move requires two traversable cells, a diagonal one four, so that no corner is
+    cut.
 
     Parameters
     ----------

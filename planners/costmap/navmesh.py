@@ -1,4 +1,4 @@
-"""The region that routes may use as a mesh of convex polygons, for searches at any angle."""
+"""The traversable region as a mesh of convex polygons, for any-angle search."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ BORDER_TOLERANCE = 1e-10  # [cells²] a point this near to a border lies on both
 
 @dataclass(frozen=True, eq=False)
 class NavigationMesh:
-    """Convex polygons whose union is the squares between four cells that can be stood on.
+    """Convex polygons whose union is the squares between four traversable cells.
 
     Coordinates are those of cell centres: column and row, integers. The sides of polygon p are
-    the rows `first[p]` to `first[p + 1]` of `corners` and `twins`, counter-clockwise. What the
-    region has without area, lines between the centres of two neighbours, are `spurs`.
+    the rows `first[p]` to `first[p + 1]` of `corners` and `twins`, counter-clockwise. Parts of the
+    region without area, segments between the centres of two neighbours, are `spurs`.
 
     Attributes
     ----------
@@ -33,14 +33,14 @@ class NavigationMesh:
     points : ndarray, shape (v, 2) [cells]
         The vertices x, y.
     kinds : ndarray of uint8, shape (v,)
-        `CORNER`: shortest routes may turn here, around the one square of four that is missing.
-        `GATE`: spurs begin or end here. `PINCH`: two squares meet here, and nowhere else.
+        `CORNER`: shortest routes may turn here, around the missing one of four squares.
+        `GATE`: spurs begin or end here. `PINCH`: two squares meet only in this point.
     first : ndarray of int64, shape (p + 1,)
     corners, twins, owner : ndarray of int64, shape (s,)
-        The vertex a side begins at; the same line as a side of the polygon beyond, or -1; the
-        polygon of the side.
+        The first vertex of each side; the side of the adjacent polygon on the same segment, or
+        -1; the polygon of the side.
     exits : ndarray of int64, shape (p,)
-        In dead ends the only side that leads out, elsewhere -1.
+        The only side that leads out of a dead end; -1 for other polygons.
     around_first, around : ndarray of int64, shape (v + 1,) and (s,)
         The polygons at each vertex v: `around[around_first[v] : around_first[v + 1]]`.
     spurs : ndarray of int64, shape (v, 4)
@@ -48,7 +48,7 @@ class NavigationMesh:
     boxes : ndarray of int64, shape (p, 4)
         Least x, y and largest x, y of each polygon.
     band_first, bands : ndarray of int64
-        The polygons that reach into each `BAND` rows of cells.
+        The polygons that overlap each strip of `BAND` rows of cells.
 
     Examples
     --------
@@ -75,7 +75,7 @@ class NavigationMesh:
 
     @classmethod
     def of(cls, traversable: Bools) -> NavigationMesh:
-        """Return the mesh of the cells that can be stood on, shape (rows, cols)."""
+        """Return the mesh of a mask of traversable cells, shape (rows, cols)."""
         lines = _lines(traversable)
         cells = np.flatnonzero(lines.kinds >= 0)
         kinds = lines.kinds.ravel()[cells].astype(np.uint8)
@@ -107,7 +107,12 @@ class NavigationMesh:
         )
 
     def holds(self, x: float, y: float) -> bool:
-        """Whether a point [cells] lies in one of the squares or on its border."""
+        """Whether a point lies in one of the squares or on its border.
+
+        Parameters
+        ----------
+        x, y : float [cells]
+        """
         rows, cols = self.squares.shape
         return any(
             bool(self.squares[row, col])
@@ -117,7 +122,12 @@ class NavigationMesh:
         )
 
     def vertex_at(self, x: float, y: float) -> int:
-        """Return the vertex at a point [cells], or -1."""
+        """Return the vertex at a point, or -1.
+
+        Parameters
+        ----------
+        x, y : float [cells]
+        """
         if x != int(x) or y != int(y):
             return -1
         cell = int(y) * (self.squares.shape[1] + 1) + int(x)
@@ -125,7 +135,12 @@ class NavigationMesh:
         return place if place < len(self.cells) and self.cells[place] == cell else -1
 
     def polygons_at(self, x: float, y: float) -> Ints:
-        """Return the polygons that a point [cells] lies in or on the border of."""
+        """Return the polygons that contain a point, borders included.
+
+        Parameters
+        ----------
+        x, y : float [cells]
+        """
         band = int(y) // BAND
         nearby = self.bands[self.band_first[band] : self.band_first[band + 1]]
         return around(
@@ -134,13 +149,13 @@ class NavigationMesh:
 
 
 class _Lines(NamedTuple):
-    """What runs along the rows and columns of cell centres, each of shape (rows, cols)."""
+    """Segments between neighbouring cell centres, and vertices, each of shape (rows, cols)."""
 
     squares: Bools  #: shape (rows - 1, cols - 1), squares between four cells
     kinds: npt.NDArray[np.int8]  #: of vertices; -1 where there is none
-    outline_east: Bools  #: from here to the next centre runs the border of squares
+    outline_east: Bools  #: the border of squares leads to the next centre
     outline_north: Bools
-    spur_east: Bools  #: from here to the next centre runs a spur
+    spur_east: Bools  #: a spur leads to the next centre
     spur_north: Bools
 
 
@@ -171,7 +186,7 @@ def _lines(traversable: Bools) -> _Lines:
 
 
 def _outlines(lines: _Lines, cells: Ints) -> Ints:
-    """Return the pieces of the squares' borders from vertex to next vertex, shape (n, 2)."""
+    """Return the segments of the borders of squares between consecutive vertices, shape (n, 2)."""
     along_row = np.flatnonzero(lines.outline_east.ravel()[cells])
     rows, cols = np.divmod(cells, lines.kinds.shape[1])
     by_column = np.lexsort((rows, cols))
@@ -186,8 +201,8 @@ def _outlines(lines: _Lines, cells: Ints) -> Ints:
 def _triangles(points: Floats, outlines: Ints, squares: Bools) -> tuple[Ints, Ints]:
     """Return the sides of the triangles within the squares, three to each: corners and twins.
 
-    All is on a lattice, and outlines meet in vertices only: what `groundmap.evidence.triangulation`
-    does for points that nearly coincide and segments that cross is not needed, nor its time.
+    All points are on a lattice, and outlines meet only in vertices, so that the treatment of nearly
+    coincident points and crossing segments in `groundmap.evidence.triangulation` is not needed.
     """
     if len(outlines) == 0:
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
@@ -197,7 +212,7 @@ def _triangles(points: Floats, outlines: Ints, squares: Bools) -> tuple[Ints, In
     library = cdt.Triangulation(
         cdt.VertexInsertionOrder.AUTO, cdt.IntersectingConstraintEdges.NOT_ALLOWED, 0.0
     )
-    vertices: Any = np.ascontiguousarray(points[inner])  # Any: its stubs want a Buffer
+    vertices: Any = np.ascontiguousarray(points[inner])  # Any: its stubs expect a Buffer
     pairs: Any = (np.cumsum(on_outline) - 1)[outlines].astype(np.uintc)
     library.insert_vertices(vertices)
     library.insert_edges(pairs)
@@ -206,7 +221,7 @@ def _triangles(points: Floats, outlines: Ints, squares: Bools) -> tuple[Ints, In
     corners = inner[triangles["vertices"].astype(np.int64)]
     beyond = triangles["neighbors"].astype(np.int64)  # across the side that begins at a corner
     beyond[beyond == cdt.NO_NEIGHBOR] = -1
-    # A triangle lies either within squares or outside all of them: its middle tells.
+    # A triangle lies either within squares or outside all of them, and so does its centroid.
     cols, rows = (points[corners].sum(axis=1).astype(np.int64) // 3).T
     inside = squares[rows, cols]
     beyond[~inside[beyond]] = -1
@@ -220,14 +235,14 @@ def _triangles(points: Floats, outlines: Ints, squares: Bools) -> tuple[Ints, In
 
 
 def _longest_first(points: Floats, corners: Ints) -> Ints:
-    """Return the sides of triangles in the order in which to try and merge across them."""
+    """Return the sides of triangles in the order in which merging across them is tried."""
     triangles = points[corners.reshape(-1, 3)]
     squared = ((np.roll(triangles, -1, axis=1) - triangles) ** 2).sum(axis=2)
     return np.argsort(-squared.ravel(), kind="stable")
 
 
 def _spurs(lines: _Lines, cells: Ints) -> Ints:
-    """Return the vertices that spurs lead to from each: east, north, west, south."""
+    """Return the vertices at the other end of spurs: east, north, west, south."""
     spurs = np.full((len(cells), 4), -1)
     width = lines.kinds.shape[1]
     for k, (spur, step) in enumerate(((lines.spur_east, 1), (lines.spur_north, width))):

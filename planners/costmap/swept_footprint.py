@@ -1,4 +1,4 @@
-"""The map and the footprint as the kernels of swept footprints read them."""
+"""The map and the footprint as arguments of the kernels of swept footprints."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from planners.geometry.kernels.swept_footprint import Ground, Shape
 from planners.geometry.rounding import SLACK
 from planners.problem.footprint import Footprint
 
-MITRE_LIMIT = 5.0  # of shapely and others that grow outlines: sharper corners are cut off
-# How far the footprint may leave the hulls of the poses it is checked at: [m], and on cells of more
-# than a metre, where a millimetre would take thousands of poses a turn, as a share of a cell.
+MITRE_LIMIT = 5.0  # as in shapely: sharper corners of grown outlines are cut off
+# How far the footprint may leave the hulls of the checked poses: [m], and as a share of a cell on
+# cells larger than a metre, where a millimetre would require thousands of poses per turn.
 BULGE = 1e-3
 
 
@@ -24,9 +24,15 @@ def ground_of(costmap: Costmap) -> Ground:
 
 
 def shape_of(footprint: Footprint, size: float, *, slack: float = SLACK) -> Shape:
-    """Return a footprint in cells of a side of `size` [m].
+    """Return a footprint in cells.
 
-    `slack` [m] is the overlap that is put down to rounding.
+    Parameters
+    ----------
+    footprint : Footprint
+    size : float [m]
+        Side of a cell.
+    slack : float, default `planners.geometry.rounding.SLACK` [m]
+        Overlap that is attributed to rounding.
     """
     parts = [part / size for part in footprint.convex_parts()]
     radius = footprint.radius / size
@@ -44,7 +50,7 @@ def shape_of(footprint: Footprint, size: float, *, slack: float = SLACK) -> Shap
 
 
 def _spike(part: Floats) -> float:
-    """Return how much more than by d its sharpest corner moves out when a polygon is grown by d."""
+    """Return how far the sharpest corner moves out per distance that a polygon is grown."""
     sides = np.diff(np.concatenate([part, part[:1]]), axis=0)
     turns = np.diff(np.unwrap(np.arctan2(*np.concatenate([sides, sides[:1]]).T[::-1])))
     return float(min(1.0 / np.cos(np.abs(turns).max() / 2.0), MITRE_LIMIT))

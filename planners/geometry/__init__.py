@@ -1,1 +1,1 @@
-"""Lines, curves and swept footprints among blocked cells, without a map."""
+"""Lines, curves and swept footprints among blocked cells; no maps."""

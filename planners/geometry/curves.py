@@ -1,4 +1,4 @@
-"""The shortest curves between two poses whose curvature is bounded: Dubins, and Reeds-Shepp."""
+"""Shortest curves of bounded curvature between two poses: Dubins and Reeds-Shepp."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ class Samples(NamedTuple):
     """Poses along a curve."""
 
     poses: Floats  #: shape (n, 3), x, y [m] and yaw [rad], start and end included
-    gears: Ints  #: shape (n - 1,), of the piece to the next pose: 1 forward, -1 backwards
+    gears: Ints  #: shape (n - 1,), of the piece to the next pose: 1 forward, -1 reverse
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Pieces of constant curvature, one after the other.
+    """A sequence of pieces of constant curvature.
 
     Attributes
     ----------
     start, goal : tuple of float
         x, y [m], yaw [rad].
     lengths : ndarray, shape (n,) [m]
-        Of the pieces; negative where driven backwards.
+        Of the pieces; negative in reverse.
     curvatures : ndarray, shape (n,) [1/m]
         Positive to the left.
 
@@ -50,19 +50,19 @@ class Curve:
 
     @property
     def length(self) -> float:
-        """Length of all of it, whichever way it is driven [m]."""
+        """Total length, forward and reverse [m]."""
         return float(np.abs(self.lengths).sum())
 
 
 def dubins(start: Sequence[float], goal: Sequence[float], *, radius: float) -> Curve:
-    """Return the shortest curve that is driven forward only.
+    """Return the shortest forward curve.
 
     Parameters
     ----------
     start, goal : sequence of float
         x, y [m], yaw [rad].
     radius : float [m]
-        Smallest turning radius, more than 0.
+        Turning radius, above 0.
 
     Raises
     ------
@@ -75,12 +75,33 @@ def dubins(start: Sequence[float], goal: Sequence[float], *, radius: float) -> C
 
 
 def reeds_shepp(start: Sequence[float], goal: Sequence[float], *, radius: float) -> Curve:
-    """Return the shortest curve that may change gear; parameters as for `dubins`."""
+    """Return the shortest curve with forward and reverse motion.
+
+    Parameters
+    ----------
+    start, goal : sequence of float
+        x, y [m], yaw [rad].
+    radius : float [m]
+        Turning radius, above 0.
+
+    Raises
+    ------
+    ProblemError
+        A radius that is not a positive number.
+    InputError
+        A pose that is not three finite numbers.
+    """
     return _curve(start, goal, radius, forward=False)
 
 
 def sample(curve: Curve, step: float) -> Samples:
-    """Return poses along a curve, at most `step` [m] apart; the last is the goal exactly.
+    """Return poses along a curve; the last is exactly the goal.
+
+    Parameters
+    ----------
+    curve : Curve
+    step : float [m]
+        Largest distance between consecutive poses.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Polylines: needless points, and the cells that a line crosses."""
+"""Polylines: lengths, distances, redundant points, crossed cells."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import numpy as np
 from groundmap.arrays import Floats, Ints
 from planners.geometry.rounding import rounding_at
 
-SAME = 1e-10  # [m] inner points that near their predecessor are the same point, up to rounding
+SAME = 1e-10  # [m] closer inner points coincide with their predecessor, up to rounding
 
 
 class CrossedCells(NamedTuple):
-    """The cells a line crosses, in order; a cell may come more than once."""
+    """The cells that a line crosses, in order; a cell may be repeated."""
 
     cells: Ints  #: shape (n, d): row, column (in 3-D: layer, row, column)
-    lengths: Floats  #: shape (n,): length of the line inside [cells]
+    lengths: Floats  #: shape (n,): length of the line inside the cell [cells]
 
 
 def length_of(points: Floats) -> float:
@@ -62,7 +62,7 @@ def distances_to(points: Floats, line: Floats) -> Floats:
 def merge_collinear(points: Floats) -> Floats:
     """Return the polyline without inner points that repeat or lie exactly on a straight line.
 
-    First and last point stay as they are, even if they coincide: a line has two ends.
+    The first and the last point are kept even if they coincide: a line has two ends.
 
     Parameters
     ----------
@@ -74,11 +74,12 @@ def merge_collinear(points: Floats) -> Floats:
 
     Examples
     --------
-    >>> merge_collinear(np.array([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0], [3.0, 0.0], [4.0,
-    1.0]])).tolist() [[0.0, 0.0], [3.0, 0.0], [4.0, 1.0]]
+    >>> line = np.array([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0], [3.0, 0.0], [4.0, 1.0]])
+    >>> merge_collinear(line).tolist()
+    [[0.0, 0.0], [3.0, 0.0], [4.0, 1.0]]
     """
     differs = np.abs(np.diff(points, axis=0)).max(axis=1) >= SAME + rounding_at(points)
-    # Inner points that repeat their predecessor go, and those that the last point repeats.
+    # Drop inner points that repeat their predecessor, and those that the last point repeats.
     kept = np.concatenate([points[:1], points[1:-1][differs[:-1]]])
     if len(kept) > 1 and not differs[-1]:
         kept = kept[:-1]
@@ -91,10 +92,10 @@ def merge_collinear(points: Floats) -> Floats:
 
 
 def cross_cells(points: Floats) -> CrossedCells:
-    """Return the cells that a polyline crosses, and the length inside each.
+    """Return the cells that a polyline crosses, and its length inside each.
 
-    Cells that are touched in a point only are left out; a line along a border crosses the cells
-    that the border opens (those above it or right of it). A line of length 0 crosses one cell.
+    Cells touched in a single point are left out. A line along a border crosses the cells above or
+    to the right of it. A line of length 0 crosses one cell.
 
     Parameters
     ----------
@@ -122,7 +123,7 @@ def cross_cells(points: Floats) -> CrossedCells:
 
 
 def _cuts(starts: Floats, ends: Floats) -> tuple[Ints, Floats]:
-    """Return where straight pieces begin, meet the borders of cells and end.
+    """Return where straight pieces begin, cross the borders of cells and end.
 
     Parameters
     ----------
@@ -131,9 +132,9 @@ def _cuts(starts: Floats, ends: Floats) -> tuple[Ints, Floats]:
     Returns
     -------
     ndarray, shape (m,)
-        Which piece, in order.
+        Index of the piece, ascending.
     ndarray, shape (m,)
-        Share of the piece up to there, in order; the same share may come more than once.
+        Fraction of the piece up to there, ascending; a fraction may be repeated.
     """
     numbers = np.arange(len(starts))
     pieces, shares = [numbers, numbers], [np.zeros(len(starts)), np.ones(len(starts))]

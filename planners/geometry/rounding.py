@@ -1,18 +1,18 @@
-"""How far coordinates are off by their rounding: more, the farther from the origin they are."""
+"""Rounding errors of coordinates, which grow with the distance from the origin."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-SLACK = 5e-10  # [m] shortfall of clearance that is put down to rounding, near the origin
+SLACK = 5e-10  # [m] shortfall of clearance that is attributed to rounding near the origin
 
 
 def rounding_at(*places: npt.ArrayLike) -> float:
-    """Return how far a difference of coordinates near places may be off by their rounding [m].
+    """Return the largest rounding error of a difference of coordinates near places [m].
 
-    That is two steps of the floats there: each of the two coordinates may be off by half a step,
-    and so may the two sums that the border of a cell is computed with.
+    It is two steps of the floats there: half a step for each of the two coordinates, and half a
+    step for each of the two sums that give the border of a cell.
 
     Parameters
     ----------
@@ -27,9 +27,9 @@ def rounding_at(*places: npt.ArrayLike) -> float:
 
 
 def slack_at(*places: npt.ArrayLike) -> float:
-    """Return the shortfall of clearance near places that is put down to rounding [m].
+    """Return the shortfall of clearance near places that is attributed to rounding [m].
 
-    It stays below what the audit tolerates of a line through these places.
+    It is below the tolerance of the audit for a line through these places.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""What is asked of a planner: start, goal, footprint, costs."""
+"""The planning problem: start, goal, footprint, costs."""

@@ -1,4 +1,4 @@
-"""What a cell costs beyond its length: little clearance, little confidence, nothing known."""
+"""Extra costs of cells with little clearance, little confidence or without observations."""
 
 from __future__ import annotations
 
@@ -8,27 +8,25 @@ from pydantic import Field
 from groundmap.arrays import Bools, Bytes, Floats, Floats32
 from groundmap.settings import Settings
 
-FREE_SPACE, MAX_NON_OBSTACLE = 0, 252  # Nav2's scale: in between, the dearer the higher
+FREE_SPACE, MAX_NON_OBSTACLE = 0, 252  # Nav2's scale of traversable cells
 INSCRIBED_INFLATED_OBSTACLE, LETHAL_OBSTACLE, NO_INFORMATION = 253, 254, 255
-DISTANCE_TOLERANCE = (
-    1e-12  # relative error granted to distances that are cut to the inflation radius
-)
+DISTANCE_TOLERANCE = 1e-12  # relative tolerance of distances cut to the inflation radius
 
 
 class CostSettings(Settings):
-    """What makes a metre dearer than a metre; with all weights at 0, the shortest route wins.
+    """Extra costs per metre; with all weights at 0, the shortest route is the best.
 
-    A weight is in metres per metre: where it applies in full, a metre costs 1 + weight.
+    A weight is in metres per metre: where it applies fully, a metre costs 1 + weight.
     """
 
     clearance_weight: float = Field(
         0.0, ge=0, le=1000, description="extra cost of a metre at the footprint's radius [m/m]"
     )
     inflation_radius: float = Field(
-        1.5, ge=0, le=1000, description="clearance that costs nothing any more [m]"
+        1.5, ge=0, le=1000, description="clearance above which there is no extra cost [m]"
     )
     cost_scaling_factor: float = Field(
-        3.0, ge=0, le=1000, description="how fast that cost falls with clearance [1/m]"
+        3.0, ge=0, le=1000, description="decay rate of that cost with clearance [1/m]"
     )
     confidence_weight: float = Field(
         0.0, ge=0, le=1000, description="extra cost of a metre of confidence 0 [m/m]"
@@ -38,15 +36,13 @@ class CostSettings(Settings):
     )
 
     def top(self, *, penalise: bool) -> float:
-        """Return the extra cost of the dearest metre there can be [m/m]."""
-        dearest = self.confidence_weight
-        if penalise:
-            dearest = max(dearest, self.unknown_weight)
-        return self.clearance_weight + dearest
+        """Return the highest possible extra cost of a metre [m/m]."""
+        doubt = self.confidence_weight
+        return self.clearance_weight + (max(doubt, self.unknown_weight) if penalise else doubt)
 
     @property
     def reach(self) -> float:
-        """Clearance beyond which nothing changes [m]."""
+        """Clearance above which costs are constant [m]."""
         return self.inflation_radius if self.clearance_weight > 0 else 0.0
 
 
@@ -59,12 +55,12 @@ def cell_costs(
     radius: float,
     penalise: bool,
 ) -> Bytes:
-    """Return the costs of cells on which the footprint may stand, from 0 to 252.
+    """Return the costs of traversable cells, from 0 to 252.
 
-    ``clearance_weight · exp(-cost_scaling_factor · (clearance - radius))``, for what is nearer
-    than the inflation radius (Nav2's formula), plus ``confidence_weight · (1 + confidence)``, or
-    ``unknown_weight`` where nothing certain is known; scaled so that the dearest metre there can
-    be costs 252.
+    The extra cost is ``clearance_weight · exp(-cost_scaling_factor · (clearance - radius))`` below
+    the inflation radius (Nav2's formula), plus ``confidence_weight · (1 + confidence)``, or
+    ``unknown_weight`` on unknown and contested cells. It is scaled so that the highest possible
+    extra cost is 252.
 
     Parameters
     ----------
@@ -74,9 +70,9 @@ def cell_costs(
     known : ndarray of bool, shape (rows, cols)
         Cells that are free; the others are unknown or contested.
     radius : float [m]
-        Of the footprint.
+        Radius of the footprint.
     penalise : bool
-        Whether what is not known costs `unknown_weight`.
+        Whether unknown and contested cells cost `unknown_weight`.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The shape of a robot on the ground: a disc, or a polygon that turns with it."""
+"""The shape of a robot on the ground: a disc, or a polygon that turns with the robot."""
 
 from __future__ import annotations
 
@@ -14,23 +14,24 @@ from groundmap.errors import InputError
 from planners.errors import ProblemError
 
 EXPECTED = "a radius of 0 or more [m], or 3 or more points x, y [m, base_link] of a simple polygon"
-MOST_DISCS = 16  # to cover a polygon with
+MOST_DISCS = 16  # that cover a polygon
 LARGEST = 1e6  # [m]
 FLAT = 1e-12  # area, as a share of the squared extent, below which a polygon is a line
 
 
 @dataclass(frozen=True, eq=False)
 class Footprint:
-    """What a robot covers of the ground.
+    """The area of the ground that a robot covers.
 
     Attributes
     ----------
     polygon : ndarray, shape (n, 2) [m, base_link], or None
         Corners, counter-clockwise, the first not repeated at the end; None for a disc.
     radius : float [m]
-        Of the smallest disc about base_link's origin that holds all of it.
+        Of the smallest disc about base_link's origin that contains the footprint.
     inscribed_radius : float [m]
-        Of the largest disc about base_link's origin that lies within; 0 if the origin doesn't.
+        Of the largest disc about base_link's origin within the footprint; 0 if the origin is
+        outside.
 
     Examples
     --------
@@ -43,7 +44,7 @@ class Footprint:
     Traceback (most recent call last):
         ...
     planners.errors.ProblemError: footprint: expected a radius of 0 or more [m], or 3 or more \
-points x, y [m, base_link] of a simple polygon, got one that meets itself at (0.5, 0.5).
+points x, y [m, base_link] of a simple polygon, got a self-intersection at (0.5, 0.5).
     """
 
     polygon: Floats | None
@@ -54,13 +55,13 @@ points x, y [m, base_link] of a simple polygon, got one that meets itself at (0.
     def of(cls, value: float | npt.ArrayLike) -> Footprint:
         """Return the footprint of a radius [m] or of a polygon's corners [m, base_link].
 
-        A repetition of the first corner at the end is dropped, and a clockwise polygon turned.
+        A repeated first corner at the end is dropped, and a clockwise polygon is reversed.
 
         Raises
         ------
         ProblemError
-            Not numbers, not finite, a negative radius, fewer than 3 points, no area, or an
-            outline that meets itself.
+            Not numbers, not finite, a negative radius, fewer than 3 points, no area, or a
+            self-intersecting outline.
         """
         if is_number(value):
             return cls._of_radius(float(value))
@@ -96,15 +97,15 @@ points x, y [m, base_link] of a simple polygon, got one that meets itself at (0.
 
     @property
     def is_disc(self) -> bool:
-        """Whether it is a disc about base_link's origin, which looks the same at every yaw."""
+        """Whether it is a disc about base_link's origin, which does not depend on the yaw."""
         return self.polygon is None
 
     @property
     def width(self) -> float:
-        """Width of the narrowest straight way that it can be moved along [m].
+        """Width of the narrowest straight passage that it can move along [m].
 
-        Of a disc, its diameter; of a polygon, the extent across the direction in which it is
-        narrowest, whatever its kinematics. No convex shape passes a narrower gap.
+        The diameter of a disc, or the smallest extent of a polygon over all directions. A convex
+        shape passes no narrower gap.
         """
         if self.polygon is None:
             return 2.0 * self.radius
@@ -114,9 +115,9 @@ points x, y [m, base_link] of a simple polygon, got one that meets itself at (0.
         return float(np.ptp(normals @ hull.T, axis=1).min())
 
     def convex_parts(self) -> list[Floats]:
-        """Return convex polygons that together are the polygon, as `polygon`; none for a disc.
+        """Return convex polygons whose union is `polygon`; none for a disc.
 
-        They are the polygon itself if it is convex, and otherwise the triangles of its constrained
+        A convex polygon is returned as it is, others as the triangles of their constrained
         Delaunay triangulation.
         """
         if self.polygon is None:
@@ -128,7 +129,7 @@ points x, y [m, base_link] of a simple polygon, got one that meets itself at (0.
         return [shapely.get_coordinates(shapely.orient_polygons(t))[:-1] for t in triangles]
 
     def covering_discs(self) -> Floats:
-        """Return discs that together cover it: shape (k, 3), x, y, radius [m, base_link].
+        """Return discs whose union covers the footprint: shape (k, 3), x, y, radius [m, base_link].
 
         The polygon is cut across its longer side into slabs half as long as it is wide.
         """
@@ -149,7 +150,7 @@ points x, y [m, base_link] of a simple polygon, got one that meets itself at (0.
         return np.array(discs)
 
     def to_value(self) -> float | list[list[float]]:
-        """Return what `of` takes, as plain numbers, for files."""
+        """Return the argument of `of` as plain numbers, for files."""
         if self.polygon is None:
             return self.radius
         corners: list[list[float]] = self.polygon.tolist()
@@ -157,7 +158,7 @@ points x, y [m, base_link] of a simple polygon, got one that meets itself at (0.
 
 
 def _corners(points: Floats) -> Floats:
-    """Return the corners of a simple polygon, counter-clockwise, each of them once."""
+    """Return the corners of a simple polygon, counter-clockwise, without repetitions."""
     if points.ndim != 2 or points.shape[1] != 2:
         raise _refusal(f"shape {points.shape}")
     corners = points[(points != np.roll(points, -1, axis=0)).any(axis=1)]
@@ -170,7 +171,7 @@ def _corners(points: Floats) -> Floats:
     if not shapely.is_valid(polygon):
         where = re.search(r"\[(\S+) (\S+)\]", str(shapely.is_valid_reason(polygon)))
         at = f" at ({float(where[1]):g}, {float(where[2]):g})" if where else ""
-        raise _refusal(f"one that meets itself{at}")
+        raise _refusal(f"a self-intersection{at}")
     turned: Floats = corners if shapely.is_ccw(polygon.exterior) else corners[::-1]
     return turned.copy()
 

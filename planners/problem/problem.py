@@ -1,4 +1,4 @@
-"""What is asked of a planner."""
+"""The planning problem: from start to goal, with a footprint, on a map."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from planners.errors import ProblemError
 from planners.problem.costs import CostSettings
 from planners.problem.footprint import LARGEST, Footprint
 
-Pose = tuple[float, ...]  #: x, y [m, map] and, where the planner heeds it, yaw [rad]
+Pose = tuple[float, ...]  #: x, y [m, map] and optionally yaw [rad]
 
 PLAIN = CostSettings()  # the shortest route is the best
 Unknown = Literal["avoid", "allow", "penalise"]
@@ -25,7 +25,7 @@ Unknown = Literal["avoid", "allow", "penalise"]
 
 @dataclass(frozen=True)
 class PlanningProblem:
-    """From where to where, with which footprint, on which map.
+    """Start, goal, footprint and costs on a map.
 
     Parameters
     ----------
@@ -34,33 +34,33 @@ class PlanningProblem:
     start, goal : sequence of float
         x, y (in 3-D: x, y, z) [m, map] and optionally yaw [rad].
     footprint : float or array_like, shape (n, 2)
-        Radius of the robot [m], or the corners of its outline [m, base_link]. Planners that know
-        no heading keep the distance of a disc that holds the outline at every heading.
+        Radius of the robot [m], or the corners of its outline [m, base_link]. Planners without
+        headings keep the clearance of the disc that contains the outline at every heading.
     unknown : {"avoid", "allow", "penalise"}
-        Whether unknown and contested cells may lie under the swept footprint; penalised, they may,
-        at a cost (``costs.unknown_weight``).
+        Whether the footprint may sweep unknown and contested cells: never, without extra cost, or
+        at an extra cost (``costs.unknown_weight``).
     costs : CostSettings, optional
-        What else makes a metre dear; nothing unless told.
+        Extra costs per metre; default: none.
     clear_start : bool, default True
         Whether *unknown* cells near the start count as free; non-free and contested ones never do.
-        `Route.start_unknown_area` says how many of them a route needs, `Route.known_clearance` how
-        near it comes to them.
-    clear_start_radius : float [m], optional
-        Cells are near whose square comes within this distance of the start. Unless told it is the
-        footprint's radius and half its width: of a disc, twice the radius. (What a forward camera
-        sees next to itself is a wedge narrower than the footprint: with only the cells under the
-        footprint cleared, the disc could never leave.)
+        `Route.start_unknown_area` is the area of those that a route uses, `Route.known_clearance`
+        its distance to them.
+    clear_start_radius : float, optional [m]
+        Cells whose square comes within this distance of the start are cleared. Default: the
+        footprint's radius plus half its width, which is twice the radius of a disc. (A forward
+        camera sees a wedge next to itself that is narrower than the footprint: if only the cells
+        under the footprint were cleared, the disc could never leave.)
     cleared_at : sequence of float, optional
-        Where the cells are that clear_start clears, if not around the start: x, y (in 3-D:
-        x, y, z) [m, map]. Of many problems on one map, each has them in the same place.
+        Centre of the cleared cells: x, y (in 3-D: x, y, z) [m, map]. Default: the start. It allows
+        several problems on one map to share the cleared cells.
     epsilon : float, default 0.01
-        Cells of a smaller absolute confidence are contested.
+        Cells with a smaller absolute confidence are contested.
 
     Raises
     ------
     ProblemError
         A place that is not 2 or 3 finite numbers (in 3-D: 3 or 4), a footprint that is neither a
-        radius of 0 or more nor a simple polygon, no grid, an option out of its range.
+        radius of 0 or more nor a simple polygon, an invalid grid, an option out of its range.
 
     Examples
     --------
@@ -87,7 +87,7 @@ got (0, nan).
     epsilon: float = EPSILON
 
     def __post_init__(self) -> None:
-        """Check every value, and turn numbers into floats."""
+        """Check every value, and convert numbers to floats."""
         if not isinstance(self.grid, ConfidenceGrid):
             raise ProblemError("grid", "a ConfidenceGrid", repr(self.grid))
         if not isinstance(self.costs, CostSettings):
@@ -114,18 +114,18 @@ got (0, nan).
 
     @property
     def shape(self) -> Footprint:
-        """The footprint, whatever it was given as."""
+        """The footprint as a `Footprint`."""
         assert isinstance(self.footprint, Footprint)
         return self.footprint
 
     @property
     def radius(self) -> float:
-        """Radius of the disc that holds the footprint at every heading [m]."""
+        """Radius of the disc that contains the footprint at every heading [m]."""
         return self.shape.radius
 
     @property
     def avoids_unknown(self) -> bool:
-        """Whether unknown and contested cells are as bad as non-free ones."""
+        """Whether unknown and contested cells are blocked like non-free ones."""
         return self.unknown == "avoid"
 
     @property
@@ -139,22 +139,49 @@ got (0, nan).
         return tuple(map(float, self.goal[: self.grid.ndim]))
 
     @property
+    def start_yaw(self) -> float | None:
+        """Yaw at the start [rad], or None."""
+        return _yaw(self.start, self.grid.ndim)
+
+    @property
+    def goal_yaw(self) -> float | None:
+        """Yaw at the goal [rad], or None."""
+        return _yaw(self.goal, self.grid.ndim)
+
+    @property
     def clear_place(self) -> Point:
-        """Where unknown cells count as free: x, y (in 3-D: x, y, z) [m, map]."""
+        """Centre of the unknown cells that count as free: x, y (in 3-D: x, y, z) [m, map]."""
         place = self.start if self.cleared_at is None else self.cleared_at
         return tuple(map(float, place[: self.grid.ndim]))
 
     @property
     def clears_its_start(self) -> bool:
-        """Whether unknown cells around the very start count as free."""
+        """Whether unknown cells around this start count as free."""
         return self.clear_start and self.clear_place == self.start_xy
 
     @property
     def clear_radius(self) -> float:
-        """How near unknown cells come to the start that count as free [m]."""
+        """Distance from the cleared place within which unknown cells count as free [m]."""
         if self.clear_start_radius is None:
             return self.radius + self.shape.width / 2.0
         return self.clear_start_radius
+
+    def check_dimensions(self, dimensions: int, *, hint: str = "") -> None:
+        """Check that the map has a number of dimensions.
+
+        Parameters
+        ----------
+        dimensions : {2, 3}
+        hint : str, optional
+            What to do otherwise, for the message.
+
+        Raises
+        ------
+        ProblemError
+        """
+        if self.grid.ndim != dimensions:
+            expected, got = f"a {dimensions}-D map", f"a {self.grid.ndim}-D map"
+            raise ProblemError("grid", expected, got, hint=hint)
 
 
 def _pose(name: str, values: Sequence[float] | Floats, ndim: int) -> tuple[float, ...]:
@@ -165,6 +192,10 @@ def _pose(name: str, values: Sequence[float] | Floats, ndim: int) -> tuple[float
     if not places or len(values) not in (ndim, ndim + 1) or not all(map(is_number, values)):
         raise ProblemError(name, expected, repr(values))
     return tuple(map(float, values))
+
+
+def _yaw(pose: Sequence[float] | Floats, ndim: int) -> float | None:
+    return float(pose[ndim]) if len(pose) > ndim else None
 
 
 def _radius(name: str, value: float) -> float:

@@ -1,25 +1,29 @@
-"""A collision-free path, with what it costs and how sure it is."""
+"""A collision-free path with its cost, clearance and confidence."""
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from os import PathLike
-from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 import shapely
-import yaml
 
 from groundmap.arrays import Bools, Floats
-from groundmap.errors import InputError
-from groundmap.files.archive import write_atomically
 from planners.costmap.map_space import MapSpace
 from planners.geometry.polyline import CrossedCells, cross_cells, distances_to, length_of
 from planners.problem.problem import PlanningProblem
+from planners.route.route_files import (
+    Format,
+    csv_table,
+    dump_json,
+    dump_yaml,
+    format_of,
+    path_message,
+    write_text,
+)
 from planners.search.base import SearchResult
 from planners.search.graph import Graph
 
@@ -31,36 +35,35 @@ class Route:
     Attributes
     ----------
     waypoints : ndarray, shape (n, 2), n >= 2 [m, map]
-        Start, turning points, goal; exactly collinear points are merged. On a 3-D map of shape
-        (n, 3).
+        Start, turning points, goal; exactly collinear points are merged. Shape (n, 3) on a 3-D
+        map.
     headings : ndarray, shape (n,) [rad, map]
-        Where the robot looks at each waypoint: as the planner decided, else along the next piece
-        (at the goal: the yaw asked for, or along the last piece).
+        Heading at each waypoint: the planned one, or else along the next piece (at the goal: the
+        requested yaw, or along the last piece).
     length : float [m]
     cost : float [m]
-        What the planner minimised: the length, where the problem says so with dear metres counted
-        more, cell by cell; of sampling planners, what their weights say, along the line.
+        The quantity that the planner minimised: the length, weighted by the cost of the cells if
+        the problem has costs; the weighted objective along the line for sampling planners.
     bound : float or None
-        The cost is at most this many times the least that the planner could have found; None if
-        it knows no bound.
+        Upper bound of the ratio of the cost to the optimal cost; None if there is no bound.
     min_clearance : float [m]
-        Distance of the line to the nearest cell it must not touch (its square), exact; infinite
-        on a map without such cells.
+        Exact distance of the line to the square of the nearest cell that the footprint must not
+        touch; infinite on a map without such cells.
     known_clearance : float [m]
-        As `min_clearance`, but to the unknown cells near the start as well that count as free:
-        what is kept for sure. It is smaller where the line comes near to such cells, and 0 where
-        it crosses one.
+        As `min_clearance`, but also to the unknown cells near the start that count as free: the
+        clearance within known space. It is 0 if the line crosses such a cell.
     mean_clearance : float [m]
-        Mean along the line of the clearance at the centres of the cells it crosses.
+        Mean along the line of the clearance at the centres of the crossed cells.
     min_confidence, mean_confidence : float
-        Confidence of being free, which is minus the grid's confidence: 1 is surely free, 0 is
-        unknown. Of the least sure cell that the line crosses; mean along the line.
+        Confidence that the crossed cells are free, which is minus the grid's confidence: 1 is
+        certainly free, 0 is unknown. The smallest of a cell, and the mean along the line.
     unknown_length : float [m]
-        Length of the line in cells of which nothing is known.
+        Length of the line in cells without any observation.
     start_unknown_area : float [m²; on a 3-D map m³]
-        Area of the unknown cells that counted as free because they are near the start and that
-        the route really uses: their centre comes under the footprint, or the line crosses them.
+        Area of the unknown cells near the start that count as free and that the route uses: the
+        footprint covers their centre, or the line crosses them.
     planner : str
+        Name of the planner.
     expanded : int
         Nodes that the search expanded.
     seconds : float [s]
@@ -68,11 +71,9 @@ class Route:
     frame : str
         Frame of the waypoints.
     audit : str
-        "clean": a route that the audit refuses is never handed out; "skipped" where
-        `planners.plan_many` was told to do without.
+        "clean": the route passed the audit; "skipped" for `planners.plan_many` without audit.
     graph : planners.search.graph.Graph or None
-        The tree or roadmap that it was found in, if a sampling planner was told to keep it; files
-        leave it out.
+        The tree or roadmap of a sampling planner, if its settings keep it; not saved to files.
     """
 
     waypoints: Floats
@@ -96,14 +97,16 @@ class Route:
 
     @classmethod
     def along(cls, space: MapSpace, result: SearchResult, *, planner: str, seconds: float) -> Route:
-        """Return the route that a planner found, measured on the map.
+        """Return a search result as a route, measured on the map.
 
         Parameters
         ----------
         space : Costmap or Voxels
         result : SearchResult
-        planner, seconds
-            As in the attributes.
+        planner : str
+            Name of the planner.
+        seconds : float [s]
+            Time that planning took.
         """
         waypoints = result.waypoints
         line = cross_cells(space.to_cells(waypoints))
@@ -150,7 +153,7 @@ class Route:
         return {"type": "Feature", "geometry": geometry, "properties": properties}
 
     def to_path(self) -> dict[str, Any]:
-        """Return a dict that looks like ROS's nav_msgs/Path: poses with quaternions [map].
+        """Return a dict with the structure of ROS's nav_msgs/Path: poses with quaternions [map].
 
         Examples
         --------
@@ -163,43 +166,31 @@ class Route:
         >>> pose["position"], round(pose["orientation"]["z"], 3)
         ({'x': 2.25, 'y': 2.25, 'z': 0.0}, 0.707)
         """
-        header = {"frame_id": self.frame, "stamp": {"sec": 0, "nanosec": 0}}
-        poses = [
-            {
-                "header": header,
-                "pose": {
-                    "position": dict(zip("xyz", [*place, 0.0], strict=False)),
-                    "orientation": _quaternion(yaw),
-                },
-            }
-            for place, yaw in zip(self.waypoints.tolist(), self.headings.tolist(), strict=True)
-        ]
-        return {"header": header, "poses": poses}
+        return path_message(self.frame, self.waypoints, self.headings)
 
     def to_csv(self) -> str:
         """Return a line per waypoint: x, y (and z) [m], yaw [rad], distance along the route [m]."""
-        steps = np.linalg.norm(np.diff(self.waypoints, axis=0), axis=1)
-        along = np.append(0.0, np.cumsum(steps))
-        table = np.column_stack([self.waypoints, self.headings, along])
-        lines = [",".join(map(repr, row)) for row in table.tolist()]
-        axes = ",".join("xyz"[: self.waypoints.shape[1]])
-        return "\n".join([f"{axes},yaw,distance", *lines, ""])
+        return csv_table(self.waypoints, self.headings)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the route to a file, all or nothing; the name's ending says how.
+        """Write the route to a file, all or nothing, in the format of the suffix.
 
         ``.geojson`` or ``.json``: a GeoJSON Feature; ``.csv``: see `to_csv`; ``.yaml``: see
-        `to_path`, as ``ros2 topic pub`` takes it.
+        `to_path`, as input of ``ros2 topic pub``.
 
         Raises
         ------
         InputError
-            Another ending.
+            Another suffix.
         OSError
             The folder does not exist or can't be written to.
         """
-        check_route_file(path)
-        _write(path, WRITERS[Path(path).suffix.lower()](self))
+        texts: dict[Format, Callable[[], str]] = {
+            "geojson": lambda: dump_json(self.to_geojson()),
+            "csv": self.to_csv,
+            "path": lambda: dump_yaml(self.to_path()),
+        }
+        write_text(path, texts[format_of(path)]())
 
     def save_geojson(self, path: str | PathLike[str]) -> None:
         """Write the GeoJSON Feature to a file, all or nothing.
@@ -209,77 +200,27 @@ class Route:
         OSError
             The folder does not exist or can't be written to.
         """
-        _write(path, _geojson(self))
-
-
-def check_route_file(path: str | PathLike[str]) -> None:
-    """Check that a route can be written to a file of that name.
-
-    Raises
-    ------
-    InputError
-        Another ending than `WRITERS` has.
-    """
-    if Path(path).suffix.lower() not in WRITERS:
-        expected = f"a name that ends in {', '.join(WRITERS)}"
-        raise InputError("path", expected, repr(str(path)))
-
-
-def _geojson(route: Route) -> str:
-    return json.dumps(route.to_geojson(), indent=2) + "\n"
-
-
-class _PlainDumper(yaml.SafeDumper):
-    """Writes what comes twice twice, as not every reader knows YAML's references."""
-
-    def ignore_aliases(self, data: object) -> bool:
-        return True
-
-
-def _path_yaml(route: Route) -> str:
-    return yaml.dump(route.to_path(), Dumper=_PlainDumper, sort_keys=False)
-
-
-WRITERS: dict[str, Callable[[Route], str]] = {
-    ".geojson": _geojson,
-    ".json": _geojson,
-    ".csv": Route.to_csv,
-    ".yaml": _path_yaml,
-    ".yml": _path_yaml,
-}
-
-
-def _write(path: str | PathLike[str], text: str) -> None:
-    def write(stream: IO[bytes]) -> None:
-        stream.write(text.encode())
-
-    write_atomically(path, write)
+        write_text(path, dump_json(self.to_geojson()))
 
 
 def _headings(waypoints: Floats, problem: PlanningProblem) -> Floats:
-    """Return where a robot looks that drives along a line; standing, as it was asked to."""
+    """Return the headings along a line; those of start and goal for a line of length 0."""
     dx, dy = np.diff(waypoints, axis=0).T[:2]
     headings = np.arctan2(dy, dx)
-    ndim = problem.grid.ndim
-    if not (dx.any() or dy.any()) and len(problem.start) > ndim:
-        headings[:] = problem.start[ndim]
-    last = problem.goal[ndim] if len(problem.goal) > ndim else headings[-1]
-    return np.append(headings, last)
-
-
-def _quaternion(yaw: float) -> dict[str, float]:
-    return {"x": 0.0, "y": 0.0, "z": math.sin(yaw / 2.0), "w": math.cos(yaw / 2.0)}
+    if not (dx.any() or dy.any()) and problem.start_yaw is not None:
+        headings[:] = problem.start_yaw
+    return np.append(headings, headings[-1] if problem.goal_yaw is None else problem.goal_yaw)
 
 
 def _mean(values: Floats, weights: Floats) -> float:
-    """Return the weighted mean; of a single point, its value."""
+    """Return the weighted mean; the value if there is a single point."""
     if weights.sum() == 0:
         return float(values[0])
     return float(np.average(values, weights=weights))
 
 
 def _known_clearance(space: MapSpace, waypoints: Floats, clearance: float) -> float:
-    """Return the distance to what is blocked or unknown but cleared, given that to the former."""
+    """Return the distance to blocked and cleared cells, given the distance to blocked ones."""
     if not space.problem.avoids_unknown or not space.cleared.any():
         return clearance
     return min(clearance, space.clearance_of(waypoints, to=space.cleared, limit=clearance))
@@ -292,12 +233,11 @@ def _start_unknown_area(space: MapSpace, result: SearchResult, line: CrossedCell
     used = np.zeros_like(space.cleared)
     used[space.cleared] = _cover(space, result, centres)
     used[tuple(line.cells.T)] = True
-    cells = float((used & space.cleared).sum())
-    return cells * space.window.resolution**space.cleared.ndim
+    return space.area_of(used & space.cleared)
 
 
 def _cover(space: MapSpace, result: SearchResult, places: Floats) -> Bools:
-    """Return which places come under the footprint: the outline as it is turned, or the disc."""
+    """Return which places the footprint covers: the outline at its headings, or the disc."""
     polygon = space.problem.shape.polygon
     if result.headings is None or polygon is None:
         return distances_to(places, result.waypoints) <= space.radius

@@ -1,4 +1,4 @@
-"""Pulling a route tight: the best chain of straight legs through points of its line."""
+"""Shortening a route: the best chain of straight legs through points of its line."""
 
 from __future__ import annotations
 
@@ -14,51 +14,49 @@ from planners.geometry.polyline import length_of, merge_collinear
 from planners.geometry.rounding import rounding_at
 from planners.problem.costs import MAX_NON_OBSTACLE
 from planners.problem.problem import PlanningProblem
-from planners.route.build import build_route
 from planners.route.kernels.shortcut import best_chain, leg_cost
 from planners.route.route import Route
+from planners.route.solve import build_route
 from planners.search.base import SearchResult
 
-AHEAD, AHEAD_DENSE = 128, 16  # points that a leg may skip: bounds the time on routes of many turns
+AHEAD, AHEAD_DENSE = 128, 16  # points that a leg may span: bounds the time on long routes
 PASSES = 12
-GAIN = 2e-4  # share of the cost; a pass that wins less is the last
-PRICE = 1e-2  # [cells] a leg more must win at least as much
-TIE = 1e-9  # [cells] the same where cells cost extra, so that no line gets dearer
+GAIN = 2e-4  # share of the cost; a pass that saves less is the last
+PRICE = 1e-2  # [cells] least saving of an additional leg
+TIE = 1e-9  # [cells] the same for non-uniform costs, so that no line becomes more expensive
 SAME_PLACE = 1e-9  # [m]
-TURNED = 1e-6  # [rad] headings that are off the line by more were decided on
+TURNED = 1e-6  # [rad] headings that deviate more from the line were planned
 
 
 def shortcut(problem: PlanningProblem, route: Route, *, clearance: float | None = None) -> Route:
-    """Return the route pulled tight: never longer, never dearer, with the same ends.
+    """Return the shortened route: never longer, never more expensive, with the same ends.
 
-    Straight legs replace parts of the line wherever they keep the footprint's radius exactly
-    (a footprint without a radius: wherever they touch nothing). The legs join waypoints, or
-    points along the line that are the denser the nearer a turn is; among such chains the best is
-    found, and the line of the best is tightened again until that wins nothing. Where cells cost
-    extra, the best is the cheapest. The result may still turn around obstacles on a side that
-    another planner wouldn't choose.
+    Straight legs replace parts of the line where they keep the footprint's radius exactly (for a
+    radius of 0, where they touch no blocked cell). The legs connect waypoints or points along the
+    line, which are denser near turns. The best of such chains is shortened again until nothing is
+    saved; with non-uniform costs, the best is the cheapest. The result may pass obstacles on
+    another side than the shortest route.
 
     Parameters
     ----------
     problem : PlanningProblem
-        What the route answers.
+        The problem of the route, on a 2-D map.
     route : Route
-        From any planner that does not decide on headings.
+        From any planner that does not plan headings.
     clearance : float, optional [m]
-        Distance that new legs keep where what they replace kept it; where that kept less, they
-        keep no less than that. Only the footprint's radius unless told.
+        Distance that new legs keep where the replaced part kept it; elsewhere they keep at least
+        the distance of that part. Default: only the footprint's radius.
 
     Returns
     -------
     Route
-        Measured anew, and audited. `bound` holds as before; `seconds` has grown by the time this
-        took.
+        Measured again, and audited. `bound` is unchanged; `seconds` includes the shortening.
 
     Raises
     ------
     ProblemError
-        A route that isn't one of the problem, or whose headings were decided on; a map that is
-        not 2-D; a clearance that is negative or no number.
+        A route of another problem or with planned headings; a 3-D map; a clearance that is
+        negative or not a number.
 
     Examples
     --------
@@ -86,25 +84,29 @@ def shortcut(problem: PlanningProblem, route: Route, *, clearance: float | None 
 
 
 def costmap_for(problem: PlanningProblem, route: Route) -> Costmap:
-    """Return the costmap of a route whose line may be changed.
+    """Return the costmap of a problem after checking that the route's line may be changed.
+
+    Parameters
+    ----------
+    problem : PlanningProblem
+    route : Route
 
     Raises
     ------
     ProblemError
         See `shortcut`.
     """
-    if problem.grid.ndim != 2:
-        raise ProblemError("problem", "one on a 2-D map", f"one on a {problem.grid.ndim}-D map")
+    problem.check_dimensions(2)
     ends = np.array([problem.start_xy, problem.goal_xy])
     if np.abs(route.waypoints[[0, -1]] - ends).max() > SAME_PLACE + rounding_at(ends):
         got = " to ".join(f"({x:.2f}, {y:.2f})" for x, y in route.waypoints[[0, -1]].tolist())
         raise ProblemError("route", "one from the problem's start to its goal", f"one from {got}")
-    if _decides_on_headings(route):
+    if _has_planned_headings(route):
         raise ProblemError(
             "route",
-            "one that only says where to drive",
-            f"one whose headings were decided on ({route.planner})",
-            hint="Its poses can be driven as they are; a changed line would need other headings.",
+            "one without planned headings",
+            f"one with planned headings ({route.planner})",
+            hint="Use the route unchanged: another line would need other headings.",
         )
     costmap = Costmap.of(problem)
     kept = costmap.clearance_of(route.waypoints)
@@ -113,13 +115,13 @@ def costmap_for(problem: PlanningProblem, route: Route) -> Costmap:
             "route",
             f"one that keeps {costmap.radius:.2f} m, the radius of a disc around the footprint",
             f"one that keeps {kept:.2f} m",
-            hint="Of a route that is planned with a polygon's headings, leave the line as it is.",
+            hint="Use a route with the headings of a polygon unchanged.",
         )
     return costmap
 
 
 def tighten(costmap: Costmap, line: Floats, *, clearance: float | None = None) -> Floats:
-    """Return the line pulled tight, shape (n, 2) [m, map].
+    """Return the shortened line, shape (n, 2) [m, map].
 
     Parameters
     ----------
@@ -141,7 +143,13 @@ def tighten(costmap: Costmap, line: Floats, *, clearance: float | None = None) -
 
 
 def cost_of(costmap: Costmap, line: Floats) -> float:
-    """Return the length of a line, the metres in dear cells counted more [m]."""
+    """Return the length of a line, weighted by the cost of the cells [m].
+
+    Parameters
+    ----------
+    costmap : Costmap
+    line : ndarray, shape (n, 2) [m, map]
+    """
     if costmap.uniform:
         return length_of(line)
     factors, cells = factors_of(costmap), costmap.to_cells(line)
@@ -150,7 +158,7 @@ def cost_of(costmap: Costmap, line: Floats) -> float:
 
 
 def factors_of(costmap: Costmap) -> Floats:
-    """Return what a metre costs in each cell, shape (rows, cols); empty if all cost the same."""
+    """Return the cost of a metre in each cell, shape (rows, cols); empty for uniform costs."""
     if costmap.uniform:
         return np.empty((0, 0))
     costs = np.minimum(costmap.costs, MAX_NON_OBSTACLE)
@@ -182,7 +190,7 @@ def _tighten_once(
 
 
 def _grade(line: Floats, resolution: float) -> list[Floats]:
-    """Return places along each leg, from 0 to 1: half a cell from its ends, 2, 8, 32 ..."""
+    """Return positions along each leg, from 0 to 1: 0.5, 2, 8, 32 ... cells from its ends."""
     lengths = np.hypot(*np.diff(line, axis=0).T) / resolution
     places = []
     for length in lengths.tolist():
@@ -193,7 +201,7 @@ def _grade(line: Floats, resolution: float) -> list[Floats]:
 
 
 def _with_points(line: Floats, places: list[Floats]) -> tuple[Floats, Ints, Ints]:
-    """Return the line with points added, and of each point the leg from it and the leg to it."""
+    """Return the line with added points, and the legs that begin and end at each point."""
     points, begins, ends = [line[:1]], [0], [-1]
     for k, along in enumerate(places):
         points += [line[k] + along[:, None] * (line[k + 1] - line[k]), line[k + 1 : k + 2]]
@@ -202,8 +210,8 @@ def _with_points(line: Floats, places: list[Floats]) -> tuple[Floats, Ints, Ints
     return np.concatenate(points), np.array(begins), np.array(ends)
 
 
-def _decides_on_headings(route: Route) -> bool:
-    """Whether the headings are others than those along the line."""
+def _has_planned_headings(route: Route) -> bool:
+    """Whether the headings deviate from the direction of the line."""
     steps = np.diff(route.waypoints, axis=0)
     moved = np.hypot(*steps.T) > SAME_PLACE + rounding_at(route.waypoints)
     off = route.headings[:-1] - np.arctan2(steps[:, 1], steps[:, 0])

@@ -1,10 +1,9 @@
-"""Rounding a route's corners: a line whose curvature is bounded, and that keeps its clearance."""
+"""Smoothing a route: rounding its corners to a bounded curvature while keeping its clearance."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,30 +14,31 @@ from planners.error_messages import Point
 from planners.errors import ProblemError, SmoothingError
 from planners.geometry.polyline import length_of
 from planners.problem.problem import PlanningProblem
-from planners.route.build import build_route
 from planners.route.kernels.smooth import free_discs, relax
 from planners.route.route import Route
 from planners.route.shortcut import cost_of, costmap_for, tighten
+from planners.route.solve import build_route
 from planners.search.base import Clock, SearchResult, check_limit
 
-ROUNDS, INNER = 24, 100  # of discs found anew, and of the relaxation in between
+ROUNDS, INNER = 24, 100  # updates of the discs, and iterations of the relaxation between them
 FEWEST, MOST = 8, 1_000_000  # pieces of a line
-REACH = (0.25, 0.05, 0.05, 0.05)  # how far discs' centres move, in turn, in turning radii: large
-# discs make room where there is none to spare, small ones use all of what there is
-FIRST, TIGHTER, TIGHTEST = 1.03, 1.05, 1.1  # by how much smaller bends are asked for than allowed
-WIDER = 0.05  # [cells] how much more clearance is asked for after a round that missed it, at most
+# Distances that the centres of discs move in successive rounds, in turning radii: large discs
+# leave tight places, small ones use the available clearance.
+REACH = (0.25, 0.05, 0.05, 0.05)
+FIRST, TIGHTER, TIGHTEST = 1.03, 1.05, 1.1  # factors by which the bound on bends is tightened
+WIDER = 0.05  # [cells] largest increase of the required clearance after a round that missed it
 STRAIGHT = 1e-9  # [rad]
-TINY = 1e-12  # [m] of steps that are no longer, the length doesn't matter
+TINY = 1e-12  # [m] least length of a step in a curvature
 SMALLEST, LARGEST = 0.01, 1000.0  # [m] turning radius
-SHARES = (0.8, 0.6, 0.4, 0.2)  # of the turning radius, tried to say how much is possible
+SHARES = (0.8, 0.6, 0.4, 0.2)  # of the turning radius, tried to report a possible one
 
 
 class _Goals(NamedTuple):
-    """What a line is to keep."""
+    """Constraints on a line."""
 
     turning_radius: float  #: [m]
     spacing: float  #: [m]
-    yaws: tuple[float | None, float | None]  #: of start and goal, where asked for
+    yaws: tuple[float | None, float | None]  #: requested at start and goal
 
 
 def smooth(
@@ -49,39 +49,39 @@ def smooth(
     spacing: float | None = None,
     time_limit: float | None = 30.0,
 ) -> Route:
-    """Return the route with its corners rounded, for a robot that can't turn on the spot.
+    """Return the route with rounded corners, for a robot that can't turn on the spot.
 
-    The route is pulled tight (`planners.shortcut`), and its points, densely spaced, are moved
-    within discs of free space until the line nowhere bends more than allowed (convex elastic
-    smoothing, after Zhu, Schmerling and Pavone 2015). It is handed out only if its exact
-    clearance and its curvature are what was asked; a sharp corner is never left behind. What
-    dear cells cost is not heeded.
+    The route is shortened (`planners.shortcut`) and resampled densely. Its points are then moved
+    within discs of free space until no bend exceeds the bound (convex elastic smoothing, after
+    Zhu, Schmerling and Pavone 2015). The result is returned only if it keeps the exact clearance
+    and the curvature everywhere. Costs of cells are not taken into account.
 
     Parameters
     ----------
     problem : PlanningProblem
-        What the route answers. Where start or goal has a yaw, the line begins or ends along it.
+        The problem of the route. The line begins and ends along the yaw of start and goal, if
+        they have one.
     route : Route
-        From any planner that does not decide on headings.
+        From any planner that does not plan headings.
     turning_radius : float [m]
-        Least radius of the line's bends, from 0.01 to 1000.
+        Smallest radius of the line's bends, from 0.01 to 1000.
     spacing : float, optional [m]
-        Distance of waypoints, about; half a cell or a quarter of the turning radius, whichever is
-        less, unless told. Half the turning radius at most.
-    time_limit : float, optional [s]
-        Time for the bending; none: no limit.
+        Approximate distance of waypoints, at most half the turning radius. Default: the smaller
+        of half a cell and a quarter of the turning radius.
+    time_limit : float or None, default 30 [s]
+        Time for the smoothing; None for no limit.
 
     Returns
     -------
     Route
         ``max_curvature(waypoints) <= 1 / turning_radius``, with headings along the line; measured
-        anew, and audited. A route that is straight stays as it is. Where it costs more than
-        before, `bound` has grown by as much.
+        again, and audited. A straight route is returned unchanged. If the cost has increased,
+        `bound` has increased by the same factor.
 
     Raises
     ------
     SmoothingError
-        The clearance is not enough for the turning radius, or no way was found to use it.
+        The clearance does not allow the turning radius, or the relaxation did not converge.
     TimeLimitError
         Time ran out.
     ProblemError
@@ -121,11 +121,11 @@ def smooth(
 
 
 def max_curvature(waypoints: Floats) -> float:
-    """Return the greatest curvature of the curve that a polyline stands for [1/m].
+    """Return the largest curvature of the curve that a polyline approximates [1/m].
 
-    At each inner point that of the arc which touches both pieces, half-way along the shorter: a
-    line of such arcs and straight pieces can be driven. Of points spaced equally along an arc it
-    is, but for the square of their spacing, that of the arc.
+    At each inner point, it is that of the arc which is tangent to both pieces and begins half-way
+    along the shorter one: a line of such arcs and straight pieces can be driven. For points spaced
+    equally along an arc, it equals that of the arc up to the square of the spacing.
 
     Parameters
     ----------
@@ -156,15 +156,15 @@ def _goals(costmap: Costmap, route: Route, turning_radius: float, spacing: float
         expected = f"above 0 and at most {turning_radius / 2.0:g} m, half the turning radius"
         raise ProblemError("spacing", expected, repr(spacing))
     if route.length / spacing > MOST:
-        expected = f"one that makes {MOST} waypoints at most, {route.length / MOST:g} m"
-        hint = "It is a quarter of the turning radius unless told."
+        expected = f"at least {route.length / MOST:g} m, for at most {MOST} waypoints"
+        hint = "The default is a quarter of the turning radius."
         raise ProblemError("spacing", expected, f"{spacing:g} m", hint=hint)
-    yaws = _yaw(costmap.problem.start), _yaw(costmap.problem.goal)
+    yaws = costmap.problem.start_yaw, costmap.problem.goal_yaw
     return _Goals(turning_radius, spacing, yaws)
 
 
 def _round_corners(costmap: Costmap, line: Floats, goals: _Goals, clock: Clock) -> Floats:
-    """Return the line with its corners rounded.
+    """Return the line with rounded corners.
 
     Raises
     ------
@@ -186,18 +186,18 @@ def _round_corners(costmap: Costmap, line: Floats, goals: _Goals, clock: Clock) 
 
 
 def _bend(costmap: Costmap, line: Floats, goals: _Goals, clock: Clock) -> tuple[Floats, bool]:
-    """Return the line, bent, and whether it keeps what it is to keep.
+    """Return the smoothed line, and whether it satisfies the constraints.
 
-    A round finds the discs around the points, and relaxes the line in them. It ends near its
-    bounds, on either side; so each bound that was missed is a little stricter in the next round.
+    Each round determines the discs around the points and relaxes the line within them. The result
+    is close to its bounds, on either side, so each missed bound is tightened for the next round.
     """
     size, radius = costmap.window.resolution, goals.turning_radius
     need = max(costmap.radius - costmap.slack, costmap.slack)
-    low, high = (1 if yaw is None else 2 for yaw in goals.yaws)  # points that are given
+    low, high = (1 if yaw is None else 2 for yaw in goals.yaws)  # fixed points
     strictness = FIRST
-    # Between two points that keep a distance, their chord may come nearer to a corner.
+    # The chord of two points may come closer to a corner than the points.
     margin = math.hypot(costmap.radius, goals.spacing / 2.0) - costmap.radius
-    longest = length_of(line)  # farther from the line than that, nothing helps
+    longest = length_of(line)  # discs farther from the line are useless
     for k in range(ROUNDS):
         clock.check(k)
         line, step = _resample(line, goals)
@@ -221,7 +221,7 @@ def _bend(costmap: Costmap, line: Floats, goals: _Goals, clock: Clock) -> tuple[
 
 
 def _on_map(costmap: Costmap, discs: Floats) -> Floats:
-    """Return discs cut to the costmap, beyond which nothing is blocked where unknown is allowed."""
+    """Return discs cut to the costmap, as nothing outside it is blocked if unknown is allowed."""
     most = np.array(costmap.blocked.shape[::-1], dtype=np.float64)
     centres = np.clip(discs[:, :2], 0.0, most)
     border = np.minimum(centres, most - centres).min(axis=1)
@@ -234,9 +234,9 @@ def _is_on_map(costmap: Costmap, line: Floats) -> bool:
 
 
 def _resample(line: Floats, goals: _Goals) -> tuple[Floats, float]:
-    """Return points along a line at equal distances, and these [m].
+    """Return points along a line at equal distances, and the distance [m].
 
-    Where a yaw is asked for, the points next to the ends are moved to where it leads.
+    If a yaw is requested at an end, the adjacent point is moved onto its direction.
     """
     along = np.append(0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T)))
     pieces = max(FEWEST, math.ceil(along[-1] / goals.spacing))
@@ -272,7 +272,7 @@ def _headings(line: Floats, yaws: tuple[float | None, float | None]) -> Floats:
 
 
 def _is_straight(line: Floats, yaws: tuple[float | None, float | None]) -> bool:
-    """Whether a line is straight, or has no length, and leads where the yaws look."""
+    """Whether a line is straight or has no length, and is aligned with the yaws."""
     if len(line) > 2:
         return False
     dx, dy = (line[1] - line[0]).tolist()
@@ -282,14 +282,10 @@ def _is_straight(line: Floats, yaws: tuple[float | None, float | None]) -> bool:
 
 
 def _worst_place(costmap: Costmap, line: Floats, turning_radius: float) -> Point:
-    """Return where a line bends too much, or, if it nowhere does, where it has least room."""
+    """Return where a line bends too much, or else where it has the least clearance."""
     curvatures = _curvatures(np.diff(line, axis=0))
     worst = int(curvatures.argmax())
     if curvatures[worst] * turning_radius <= 1.0:
         worst = int(np.argmin([costmap.clearance_of(point) for point in line[1:-1]]))
     x, y = line[1 + worst].tolist()
     return x, y
-
-
-def _yaw(place: Sequence[float] | Floats) -> float | None:
-    return float(place[2]) if len(place) > 2 else None

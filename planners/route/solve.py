@@ -1,29 +1,25 @@
-"""From an engine to a route: ends are checked, reasons are given, routes are audited."""
+"""From a search engine to a route: endpoints are checked, failures explained, routes audited."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any
 
-from planners.costmap.costmap import Costmap
+from planners.audit.audit import audit
 from planners.costmap.endpoint_check import check_space
-from planners.costmap.voxel_map import Voxels
+from planners.costmap.map_space import MapSpace
 from planners.error_messages import Place
 from planners.errors import AuditError, ProblemError
-from planners.no_route import explain_enclosure, explain_enclosure_3d
-from planners.problem.problem import PlanningProblem, Pose
-from planners.route.build import build_route
+from planners.no_route import explain_no_route
+from planners.problem.problem import Pose
 from planners.route.route import Route
-from planners.search.astar3d import AStar3D
-from planners.search.base import Engine, clock_from, now
-
-SpaceT = TypeVar("SpaceT", bound=Costmap | Voxels)
+from planners.search.base import Engine, SearchResult, clock_from, now
 
 
 def solve(
-    space: Costmap | Voxels,
-    engine: Engine | AStar3D,
+    space: MapSpace,
+    engine: Engine,
     settings: Any,
     *,
     began: float,
@@ -31,28 +27,29 @@ def solve(
     audited: bool = True,
     watch: dict[str, Any] | None = None,
 ) -> Route:
-    """Return the engine's route for the problem of a space, or raise why there is none.
+    """Return the engine's route for the problem of a space, or raise the reason for failure.
 
     Parameters
     ----------
     space : Costmap or Voxels
-        Of the problem; the engine was made on its cells.
+        Of the problem; the engine searches its cells.
     engine : Engine
-    settings : Settings
+    settings : SearchSettings
         The engine's.
     began : float [s]
-        When the work for this route began, by `planners.search.base.now`: the time limit counts
+        When the work for this route began, by `planners.search.base.now`. The time limit counts
         from then.
     headings : bool, default False
-        Whether the planner heeds headings, so that an outline is turned with the robot.
+        Whether the planner plans headings, so that an outline turns with the robot.
     audited : bool, default True
+        Whether the route is audited.
     watch : dict, optional
-        What an anytime engine's search is given besides: "on_improved", "cancel".
+        Further options of the search of an anytime engine: "on_improved", "cancel".
 
     Raises
     ------
     ProblemError
-        A start or a goal without a yaw, for a planner that heeds headings.
+        A start or a goal without a yaw, for a planner that plans headings.
     NonFreeError, UnknownSpaceError, EnclosedError, TimeLimitError, CancelledError, UnsolvedError
     AuditError
     """
@@ -67,25 +64,41 @@ def solve(
     with clock_from(began):
         result = engine.search(start, goal, settings, **(watch or {}))
     if result is None:
-        if isinstance(space, Voxels):
-            raise explain_enclosure_3d(space)
-        raise explain_enclosure(
-            space, needed=2.0 * problem.shape.inscribed_radius if headings else None
-        )
+        raise explain_no_route(space, headings=headings)
     if result.goal is not None:
-        axes = problem.grid.ndim
+        axes = len(problem.goal_xy)
         if audited and not settings.will_do(result.goal, goal, axes=axes):
-            off = math.dist(result.goal[:axes], goal[:axes])
-            raise AuditError("ends at no goal", result.goal[:axes], got=off, needed=0.0)
-        space = with_problem(
-            space, replace(problem, goal=result.goal, cleared_at=problem.clear_place)
+            off = math.dist(result.goal[:axes], problem.goal_xy)
+            raise AuditError("does not end at a goal", result.goal[:axes], got=off, needed=0.0)
+        space = space.with_problem(
+            replace(problem, goal=result.goal, cleared_at=problem.clear_place)
         )
     seconds = now() - began
     return build_route(space, result, planner=engine.name, seconds=seconds, audited=audited)
 
 
-def with_problem(space: SpaceT, problem: PlanningProblem) -> SpaceT:
-    """Return the space of another query, with all that was worked out about the map."""
-    twin = replace(space, problem=problem)
-    vars(twin).update(vars(space) | {"problem": problem})
-    return twin
+def build_route(
+    space: MapSpace, result: SearchResult, *, planner: str, seconds: float, audited: bool = True
+) -> Route:
+    """Return a search result as a route that passed the audit.
+
+    Parameters
+    ----------
+    space : Costmap or Voxels
+    result : SearchResult
+    planner : str
+        Name of the planner.
+    seconds : float [s]
+        Time that planning took.
+    audited : bool, default True
+        Whether the route is audited.
+
+    Raises
+    ------
+    AuditError
+        The result violates the required clearance or the endpoints: a bug in the planner.
+    """
+    if audited:
+        audit(space.problem, result.waypoints, headings=result.headings)
+    route = Route.along(space, result, planner=planner, seconds=seconds)
+    return route if audited else replace(route, audit="skipped")

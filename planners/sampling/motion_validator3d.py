@@ -14,7 +14,7 @@ from groundmap.arrays import Bools, Floats, Ints32
 from planners.costmap.kernels.distance import NOWHERE
 from planners.costmap.voxel_map import Voxels
 from planners.problem.problem import Pose
-from planners.sampling.kernels.edges3d import all_squared_distances, line_clear
+from planners.sampling.kernels.edges3d import line_clear
 from planners.sampling.motion_validator import REACH, SHARE, Bounds, box_of
 from planners.sampling.settings import StateSpace
 
@@ -60,7 +60,7 @@ class MotionValidator3D:
 
     def __init__(self, voxels: Voxels) -> None:
         self.voxels = self.costmap = voxels
-        self.squared = all_squared_distances(voxels.blocked)
+        self.squared = voxels.all_squared
         numbers = voxels.window.resolution, voxels.radius, voxels.slack
         self.is_clear = partial(line_clear, self.squared, *numbers)
 

@@ -16,7 +16,7 @@ from planners.costmap.endpoint_check import check_on_map, check_space
 from planners.errors import AuditError, ProblemError, UnsolvedError
 from planners.problem.problem import PlanningProblem, Pose
 from planners.route.route import Route
-from planners.route.solve import solve, with_problem
+from planners.route.solve import solve
 from planners.sampling.motion_validator import MotionValidator
 from planners.sampling.objectives import Objective
 from planners.sampling.ompl_module import samplers
@@ -177,7 +177,7 @@ class Roadmap:
         check_on_map(problem)
         try:
             return solve(
-                with_problem(self.validator.costmap, problem),
+                self.validator.costmap.with_problem(problem),
                 self,
                 self.settings,
                 began=began,
@@ -264,8 +264,7 @@ def _ways_of(
     if planner == "prmstar" and told.max_nearest_neighbors is not None:
         expected = "none for 'prmstar', which takes more and more"
         raise SettingsError("max_nearest_neighbors", expected, str(told.max_nearest_neighbors))
-    if problem.grid.ndim != 2:
-        raise ProblemError("grid", "a 2-D map", f"one of {problem.grid.ndim}-D")
+    problem.check_dimensions(2)
     check_on_map(replace(problem, goal=problem.start))
     start, goal = tuple(map(float, problem.start)), tuple(map(float, problem.goal))
     space = told.space_for(problem.shape, start, goal)

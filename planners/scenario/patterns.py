@@ -47,7 +47,7 @@ def is_found(pattern: str, text: str) -> bool:
 
     Examples
     --------
-    >>> is_found("fenced in", "the goal is fenced in"), is_found(r"\d m", "3 km")
+    >>> is_found("enclosed", "the goal is enclosed"), is_found(r"\d m", "3 km")
     (True, False)
     """
     if PLAIN.fullmatch(pattern):

@@ -21,14 +21,14 @@ def print_table(outcomes: Sequence[Outcome]) -> None:
     ...         "room",
     ...         "a room",
     ...         True,
-    ...         figures={"through.reason": "no route: the goal is fenced in."},
+    ...         figures={"through.reason": "no route: the goal is enclosed."},
     ...         seconds=1.26,
     ...     ),
     ...     Outcome("glass door", "glass", False, missed=("false_free: 0.2, not ≤ 0.01",)),
     ...     Outcome("drive", "a log", None, skipped="no such file"),
     ... ])
     room        passed      1.3 s
-        through: no route: the goal is fenced in.
+        through: no route: the goal is enclosed.
     glass door  FAILED      0.0 s
         false_free: 0.2, not ≤ 0.01
     drive       skipped     0.0 s

@@ -65,7 +65,7 @@ goal = [8, 4.5]
 footprint = 0.3              # radius to plan with, or an outline: [[x, y], ...]
 robot_radius = 0.25          # what must not touch the true world
 expect = "route"             # or the error: EnclosedError, NonFreeError, UnknownSpaceError, ...
-# reason = "fenced in"       # what the error's sentence holds: a regular expression
+# reason = "enclosed"       # what the error's sentence holds: a regular expression
 # unknown = "allow"          # unknown and contested space: avoid, allow or penalise
 # time_limit = 2.0           # search time
 # settings = {{ weight = 1 }}  # of the planner

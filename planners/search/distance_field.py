@@ -130,11 +130,7 @@ def reachable(
 
 
 def _costmap(space: PlanningProblem | Costmap) -> Costmap:
-    if isinstance(space, Costmap):
-        return space
-    if space.grid.ndim != 2:
-        raise ProblemError("grid", "a 2-D map", f"one of {space.grid.ndim}-D")
-    return Costmap.of(space)
+    return space if isinstance(space, Costmap) else Costmap.of(space)
 
 
 def _place(name: str, values: Sequence[float] | Floats) -> tuple[float, float]:

@@ -43,7 +43,7 @@ def test_a_route_passes_for_its_min_clearance_and_not_for_more(seed: int) -> Non
     problem, route = random_route(seed)
     assert route.min_clearance >= problem.radius - 1e-9
     audit(with_radius(problem, route.min_clearance), route.waypoints)
-    with pytest.raises(AuditError, match=r"comes too near to a (nonfree|unknown) cell"):
+    with pytest.raises(AuditError, match=r"comes too close to (a non-free|an unknown) cell"):
         audit(with_radius(problem, route.min_clearance + 1e-6), route.waypoints)
 
 
@@ -65,7 +65,7 @@ def test_a_route_nudged_into_an_obstacle_is_refused(seed: int) -> None:
     waypoints = route.waypoints.copy()
     nearest = np.hypot(*(obstacles - waypoints[1]).T).argmin()
     waypoints[1] = obstacles[nearest] + problem.radius * 0.5
-    with pytest.raises(AuditError, match="comes too near to a nonfree cell at"):
+    with pytest.raises(AuditError, match="comes too close to a non-free cell at"):
         audit(problem, waypoints)
 
 
@@ -78,10 +78,10 @@ def field_problem(*, footprint: float = 1.0) -> PlanningProblem:
 @pytest.mark.parametrize(
     ("points", "fault"),
     [
-        ([(10.5, 10.5), (30.5, 29.5), (50.5, 10.5)], "nonfree cell"),
-        ([(10.5, 10.5), (50.5, 30.5), (40.5, 39.5), (50.5, 10.5)], "unknown cell"),
-        ([(10.5, 10.5), (30.5, 0.5), (50.5, 10.5)], "unknown cell"),
-        ([(10.5, 10.5), (30.5, -40.5), (50.5, 10.5)], "unknown cell"),
+        ([(10.5, 10.5), (30.5, 29.5), (50.5, 10.5)], "a non-free cell"),
+        ([(10.5, 10.5), (50.5, 30.5), (40.5, 39.5), (50.5, 10.5)], "an unknown cell"),
+        ([(10.5, 10.5), (30.5, 0.5), (50.5, 10.5)], "an unknown cell"),
+        ([(10.5, 10.5), (30.5, -40.5), (50.5, 10.5)], "an unknown cell"),
         ([(10.5, 10.5), (50.5, 10.6)], "misses the goal"),
         ([(10.6, 10.5), (50.5, 10.5)], "misses the start"),
         ([(10.5, 10.5), (np.nan, 3.0), (50.5, 10.5)], "is not finite"),
@@ -95,7 +95,7 @@ def test_every_fault_is_named(points: npt.ArrayLike, fault: str) -> None:
 def test_at_radius_zero_a_line_may_touch_a_square_and_not_enter_it() -> None:
     problem = field_problem(footprint=0.0)
     audit(problem, np.array([(10.5, 10.5), (30.0, 29.0), (30.0, 36.0), (50.5, 36.0), (50.5, 10.5)]))
-    with pytest.raises(AuditError, match=r"comes too near to a nonfree cell at .*got 0 m"):
+    with pytest.raises(AuditError, match=r"comes too close to a non-free cell at .*got 0 m"):
         audit(problem, np.array([(10.5, 10.5), (30.1, 29.0), (30.1, 32.0), (50.5, 10.5)]))
 
 
@@ -106,9 +106,9 @@ def test_unknown_cells_near_the_start_are_passed_and_others_are_not() -> None:
     leaving = np.array([(23.0, 30.0), (40.0, 30.0)])
     problem = PlanningProblem(grid, start=leaving[0], goal=leaving[1], footprint=1.5)
     audit(problem, leaving)
-    with pytest.raises(AuditError, match="unknown cell"):
+    with pytest.raises(AuditError, match="an unknown cell"):
         audit(problem, np.array([(23.0, 30.0), (23.0, 39.0), (40.0, 30.0)]))
-    with pytest.raises(AuditError, match="unknown cell"):
+    with pytest.raises(AuditError, match="an unknown cell"):
         audit(
             PlanningProblem(
                 grid, start=leaving[0], goal=leaving[1], footprint=1.5, clear_start=False
@@ -140,7 +140,7 @@ def test_an_outline_may_pass_where_its_disc_may_not() -> None:
     problem = car_problem(CAR)
     waypoints, headings = drive(29.3)
     audit(problem, waypoints, headings=headings)
-    with pytest.raises(AuditError, match="comes too near to a nonfree cell"):
+    with pytest.raises(AuditError, match="comes too close to a non-free cell"):
         audit(problem, waypoints)
 
 
@@ -149,13 +149,13 @@ def test_an_outline_may_touch_a_square_and_not_enter_it() -> None:
     waypoints, headings = drive(29.4)
     audit(car_problem(CAR, **ends), waypoints, headings=headings)
     low = {"start": (20.0, 29.4 + 1e-6, 0.0), "goal": (40.0, 29.4 + 1e-6, 0.0)}
-    with pytest.raises(AuditError, match=r"sweeps a nonfree cell at \(3\d\.\d\d, 30\.00\)"):
+    with pytest.raises(AuditError, match=r"sweeps a non-free cell at \(3\d\.\d\d, 30\.00\)"):
         audit(car_problem(CAR, **low), waypoints + np.array([0, 1e-6]), headings=headings)
 
 
 def test_an_outline_that_turns_into_an_obstacle_is_refused() -> None:
     waypoints, headings = drive(29.3, turn=0.3)
-    with pytest.raises(AuditError, match="sweeps a nonfree cell"):
+    with pytest.raises(AuditError, match="sweeps a non-free cell"):
         audit(car_problem(CAR), waypoints, headings=headings)
 
 
@@ -167,7 +167,7 @@ def placed(outline: list[tuple[float, float]], pose: Floats) -> shapely.Polygon:
 
 @given(rngs(), st.sampled_from([CAR, HOOK]), st.floats(-2.5, 2.5))
 @settings(max_examples=60)
-def test_what_an_outline_sweeps_between_two_poses_is_refused(
+def test_an_outline_that_sweeps_an_obstacle_between_two_poses_is_refused(
     rng: np.random.Generator, outline: list[tuple[float, float]], turn: float
 ) -> None:
     first = np.array([28.0, 30.0, rng.uniform(-1.5, 1.5)])
@@ -175,7 +175,7 @@ def test_what_an_outline_sweeps_between_two_poses_is_refused(
     between = [placed(outline, first + t * (last - first)) for t in np.linspace(0, 1, 100)]
     assume(shapely.area(shapely.intersection(between, shapely.box(30, 30, 31, 31))).max() > 1e-6)
     poses = np.array([first, last])
-    with pytest.raises(AuditError, match="sweeps a nonfree cell"):
+    with pytest.raises(AuditError, match="sweeps a non-free cell"):
         audit(car_problem(outline, start=first, goal=last), poses[:, :2], headings=poses[:, 2])
 
 
@@ -185,7 +185,7 @@ def test_a_turn_of_a_rounding_error_hides_nothing(y: float, yaw: float) -> None:
     for dx, dy in (0.5, 0.3), (0.2, 0.5):
         poses = np.array([[28.0, y, yaw], [28.0 + dx, y + dy, yaw + 6e-8]])
         problem = car_problem(CAR, start=poses[0], goal=poses[1])
-        with pytest.raises(AuditError, match="sweeps a nonfree cell"):
+        with pytest.raises(AuditError, match="sweeps a non-free cell"):
             audit(problem, poses[:, :2], headings=poses[:, 2])
 
 
@@ -196,7 +196,7 @@ def test_the_hollow_of_an_outline_is_not_part_of_it(y: float, clear: bool) -> No
     if clear:
         audit(problem, up, headings=np.zeros(50))
     else:
-        with pytest.raises(AuditError, match="sweeps a nonfree cell"):
+        with pytest.raises(AuditError, match="sweeps a non-free cell"):
             audit(problem, up, headings=np.zeros(50))
 
 

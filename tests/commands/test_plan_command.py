@@ -73,7 +73,7 @@ def test_a_planner_that_can_not_is_named_and_the_others_go_on(wall: Path) -> Non
 def test_where_no_planner_finds_a_route_the_reason_is_said(wall: Path) -> None:
     ran = plan(wall, "--planner", "all", footprint="1.2")
     assert ran.code == 3
-    assert "your footprint needs 2.40 m" in ran.json["reason"]
+    assert "the footprint needs 2.40 m" in ran.json["reason"]
 
 
 def test_settings_reach_the_planner(wall: Path) -> None:
@@ -156,7 +156,7 @@ def test_a_voxel_map_can_be_planned_on(tmp_path: Path) -> None:
     assert "expected a 2-D map, to draw it, got one of 3-D" in picture.json["reason"]
     ran = plan(tmp_path / "box.3dmap", "--planner", "jps", start="2,2,2", goal="9,2,9")
     assert ran.code == 2
-    assert "planner: expected one that plans on 3-D maps: astar, auto" in ran.json["reason"]
+    assert "planner: expected one that supports 3-D maps: astar, auto" in ran.json["reason"]
 
 
 def test_what_takes_long_is_spoken_of(capsys: pytest.CaptureFixture[str]) -> None:
@@ -223,4 +223,4 @@ def test_where_all_planners_refuse_the_problem_the_first_says_why(tmp_path: Path
     options = ("--planner", "all", "--clearance-weight", "2")
     ran = run("plan", tmp_path / "solid.npz", *ends, *options)
     assert ran.code == 2
-    assert "costs: expected none but length on a 3-D map" in ran.err
+    assert "costs: expected no costs except length on a 3-D map" in ran.err

@@ -63,9 +63,7 @@ def test_a_move_is_allowed_if_the_disc_fits_on_every_cell_of_its_block(
 
 @given(masks(side=7), st.sampled_from(RADII))
 @settings(max_examples=60, deadline=None)
-def test_what_allowed_moves_span_keeps_the_distance_everywhere(
-    blocked: Bools, radius: float
-) -> None:
+def test_allowed_moves_keep_the_distance_everywhere(blocked: Bools, radius: float) -> None:
     moves = allowed_moves(standing(blocked, radius))
     obstacles = union_of_squares(blocked)
     east, northeast, north = (np.argwhere(moves >> k & 1) + 0.5 for k in range(3))
@@ -198,7 +196,7 @@ def test_an_updated_costmap_is_the_one_made_from_scratch(
     )
 
 
-def test_a_map_that_grew_is_looked_at_as_a_whole() -> None:
+def test_a_map_that_has_grown_is_read_completely() -> None:
     grid = grid_of(free_field(64, 64))
     problem = PlanningProblem(grid, start=(9, 9), goal=(50, 50), footprint=1.0)
     costmap = Costmap.of(problem)
@@ -226,7 +224,7 @@ def test_beyond_the_inflation_radius_no_clearance_costs(inflation: float) -> Non
     assert (costmap.costs[costmap.clearance < inflation - 1e-9] > 0).all()
 
 
-def test_what_is_exactly_within_the_clear_radius_is_cleared_in_any_window() -> None:
+def test_cells_exactly_within_the_clear_radius_are_cleared_in_any_window() -> None:
     rng = np.random.default_rng(0)
     for resolution in (0.05, 0.1, 0.15, 0.1524):
         grid = ConfidenceGrid(resolution=resolution, origin=(-3.3, 0.0))
@@ -247,7 +245,7 @@ def test_what_is_exactly_within_the_clear_radius_is_cleared_in_any_window() -> N
 
 
 @pytest.mark.parametrize("changed", [[1, 2, 3, 4], [[1, 2, 3, 4]], [[1.5, 2.0]], "ab"])
-def test_changed_cells_are_rows_of_two_whole_numbers(changed: Any) -> None:
+def test_changed_cells_are_rows_of_two_integers(changed: Any) -> None:
     problem = PlanningProblem(grid_of(free_field(8, 8)), start=(4, 4), goal=(4, 4), footprint=1.0)
     with pytest.raises(ProblemError, match=r"changed: expected whole numbers \[row, col\]"):
         Costmap.of(problem).with_changes(changed)
@@ -256,7 +254,7 @@ def test_changed_cells_are_rows_of_two_whole_numbers(changed: Any) -> None:
 # Sums
 
 
-DEAREST = CostSettings(
+MOST_EXPENSIVE = CostSettings(
     clearance_weight=1000.0,
     confidence_weight=1000.0,
     inflation_radius=100.0,
@@ -278,12 +276,12 @@ def serpentine(side: int) -> PlanningProblem:
         goal=(0.5, side - 0.5),
         footprint=0.0,
         clear_start=False,
-        costs=DEAREST,
+        costs=MOST_EXPENSIVE,
     )
 
 
 @pytest.mark.parametrize("planner", ["astar", "dijkstra", "weighted_astar", "ara", "dstar_lite"])
-def test_the_sums_of_the_dearest_metres_are_exact(planner: str) -> None:
+def test_the_sums_of_the_highest_costs_are_exact(planner: str) -> None:
     route = plan(serpentine(99), planner)
     assert route.length > 99 * 49
     factor = 1.0 + 2000.0 * 250 / 252
@@ -294,7 +292,7 @@ def test_the_sums_of_the_dearest_metres_are_exact(planner: str) -> None:
 def test_weights_whose_sums_would_overflow_are_refused(planner: str) -> None:
     # 1.1 million cells at 1985 each: more than the 2^31 cells that the integers hold.
     with pytest.raises(
-        ProblemError, match=r"costs: expected weights with which the 1\d+ free cells"
+        ProblemError, match=r"costs: expected a total cost of the 1\d+ traversable cells of at most"
     ):
         plan(serpentine(1499), planner)
 
@@ -305,7 +303,7 @@ def test_a_distance_field_whose_sums_would_overflow_is_refused() -> None:
         distance_field(asked, asked.start)
 
 
-def test_the_highest_weights_are_accepted_where_few_cells_are_dear() -> None:
+def test_the_highest_weights_are_accepted_if_few_cells_are_expensive() -> None:
     few = CostSettings(clearance_weight=1000.0, inflation_radius=3.0)
     asked = PlanningProblem(
         grid_of(free_field(1024, 1024)),
@@ -325,6 +323,6 @@ def test_the_clearance_of_few_cells_is_that_of_the_whole_map(blocked: Bools, rea
     costmap, whole = Costmap.of(asked), Costmap.of(asked).clearance
     cells = np.argwhere(~costmap.blocked)[:: 7 * reach]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("planners.costmap.costmap.FIRST_REACH", reach)
+        patch.setattr("planners.costmap.map_space.FIRST_REACH", reach)
         np.testing.assert_array_equal(costmap.clearance_at(cells), whole[tuple(cells.T)])
     assert "all_squared" not in vars(costmap)

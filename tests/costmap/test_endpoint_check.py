@@ -61,7 +61,7 @@ def test_a_start_that_gets_off_the_unknown_cells_is_fenced_in() -> None:
     z = free_field(64, 64)
     z[:, 30] = BLOCKED
     z[20:25, 10:15] = UNSEEN
-    with pytest.raises(EnclosedError, match="the start is fenced in"):
+    with pytest.raises(EnclosedError, match="the start is enclosed"):
         plan(problem(grid_of(z), start=(12.5, 22.5), goal=(55.5, 30.5)))
 
 
@@ -69,12 +69,12 @@ def test_a_start_among_nonfree_cells_is_fenced_in_though_it_is_unknown() -> None
     z = free_field(64, 64)
     z[20:27, 20:27] = BLOCKED
     z[22:25, 22:25] = UNSEEN
-    with pytest.raises(EnclosedError, match="the start is fenced in"):
+    with pytest.raises(EnclosedError, match="the start is enclosed"):
         plan(problem(grid_of(z), start=(23.5, 23.5), goal=(55.5, 30.5), footprint=1.0))
 
 
 def test_the_nearest_place_is_one_that_the_other_end_can_be_reached_from() -> None:
-    # The nearest free place to the pillar's middle is in the room that nobody gets into.
+    # The nearest free place to the pillar's middle is in the inaccessible room.
     with pytest.raises(NonFreeError, match="goal") as caught:
         plan(problem(pocketed(), start=(50, 50), goal=(20.5, 22.5)))
     assert caught.value.nearest is not None

@@ -56,10 +56,10 @@ def test_replanning_ignores_a_far_tile_that_comes_later() -> None:
     assert planner.plan().cost == before
 
 
-def test_where_unknown_cells_can_be_crossed_the_far_tile_is_named() -> None:
+def test_the_far_tile_is_named_if_unknown_cells_are_traversable() -> None:
     sentence = (
         r"33554432 cells .*: 1 of 5 tiles, around \(2000, 2000\), lies 28\d\d m from the largest "
-        r"part; a pose may be wrong there"
+        r"part; its poses may be wrong"
     )
     with pytest.raises(ProblemError, match=sentence):
         plan(problem(with_far_tile(), unknown="allow"))

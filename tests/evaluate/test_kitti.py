@@ -119,7 +119,9 @@ def test_a_car_parks_where_its_enclosing_disc_does_not_fit(street: ConfidenceGri
     car = [(-0.5, -0.6), (2.0, -0.6), (2.0, 0.6), (-0.5, 0.6)]
     first, last = street.trajectory[[0, -1]]
     problem = PlanningProblem(street, start=first, goal=last, footprint=car)
-    with pytest.raises(NonFreeError, match=r"goal .* The nearest place for it is"):
+    with pytest.raises(
+        NonFreeError, match=r"goal .* The nearest position where the footprint fits is"
+    ):
         plan(problem)
     assert plan(problem, "hybrid_astar", turning_radius=4.0).audit == "clean"
 

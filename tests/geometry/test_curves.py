@@ -115,7 +115,7 @@ def test_no_way_to_go_is_two_equal_poses() -> None:
     assert gears.tolist() == [1]
 
 
-def test_what_is_no_curve_is_refused() -> None:
+def test_invalid_curves_are_refused() -> None:
     with pytest.raises(ProblemError, match=r"radius: expected a turning radius above 0 \[m\]"):
         dubins(ORIGIN, ORIGIN, radius=0.0)
     with pytest.raises(ProblemError, match=r"radius: expected .*, got inf"):

@@ -17,7 +17,7 @@ LINES = arrays(np.float64, st.tuples(st.integers(2, 8), st.integers(2, 3)), elem
 
 
 @given(LINES)
-def test_a_line_crosses_what_its_pieces_cross_one_after_the_other(line: Floats) -> None:
+def test_a_line_crosses_the_cells_of_its_pieces_in_order(line: Floats) -> None:
     pieces = [cross_cells(np.array(piece)) for piece in pairwise(line)]
     cells = np.concatenate([piece.cells for piece in pieces])
     lengths = np.concatenate([piece.lengths for piece in pieces])
@@ -28,7 +28,7 @@ def test_a_line_crosses_what_its_pieces_cross_one_after_the_other(line: Floats) 
 
 
 @given(LINES)
-def test_who_walks_the_lengths_is_in_the_cells(line: Floats) -> None:
+def test_positions_along_the_line_are_in_the_crossed_cells(line: Floats) -> None:
     cells, lengths = cross_cells(line)
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     corners = np.append(0.0, np.cumsum(steps))

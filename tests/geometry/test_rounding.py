@@ -20,7 +20,7 @@ from planners import (
     plan,
     shortcut,
 )
-from planners.audit.audit import TOLERANCE
+from planners.audit.obstacles import TOLERANCE
 from planners.geometry.rounding import rounding_at, slack_at
 
 PLACES = {"UTM": (448_000.0, 5_412_000.0, 300.0), "far": (1e8, -1e8, 1e8)}  # [m, map]
@@ -31,7 +31,7 @@ RADII = [0.5, 0.75, 1.0, 1.3]  # [cells]
 
 
 @pytest.mark.parametrize("scale", [0.0, 1.0, 1e3, 5.4e6, 1e8])
-def test_the_slack_stays_below_what_the_audit_tolerates(scale: float) -> None:
+def test_the_slack_is_below_the_tolerance_of_the_audit(scale: float) -> None:
     step = float(np.spacing(scale))
     assert slack_at((0.0, scale)) < TOLERANCE + 4.0 * step
     assert rounding_at((-scale, 0.0)) == rounding_at((0.0, 0.0), (scale, scale)) == 2.0 * step

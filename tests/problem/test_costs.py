@@ -1,4 +1,4 @@
-"""Costs of cells: Nav2's scale and formula, dearer where little is clear, sure or known."""
+"""Costs of cells: Nav2's scale and formula, higher for little clearance or confidence."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ def cost(clearance: float, confidence: float, settings: CostSettings, *, known: 
 
 
 @given(st.floats(0.5, 4), st.floats(0.5, 4), st.floats(0.1, 10))
-def test_a_cell_with_more_clearance_is_never_dearer(a: float, b: float, factor: float) -> None:
+def test_a_cell_with_more_clearance_never_costs_more(a: float, b: float, factor: float) -> None:
     settings = CostSettings(clearance_weight=1.0, cost_scaling_factor=factor)
     near, far = min(a, b), max(a, b)
     assert cost(near, -1.0, settings) >= cost(far, -1.0, settings)
 
 
 @given(st.floats(-1, -0.01), st.floats(-1, -0.01))
-def test_a_surer_cell_is_never_dearer(a: float, b: float) -> None:
+def test_a_cell_of_higher_confidence_never_costs_more(a: float, b: float) -> None:
     settings = CostSettings(confidence_weight=2.0)
     assert cost(9.0, max(a, b), settings) >= cost(9.0, min(a, b), settings)
 
@@ -57,7 +57,7 @@ def test_inflation_is_that_of_nav2() -> None:
     assert cost(2.0, -1.0, settings) == 0
 
 
-def test_what_is_not_known_costs_its_weight_however_sure_its_value() -> None:
+def test_unknown_cells_cost_their_weight_at_any_confidence() -> None:
     settings = CostSettings(unknown_weight=3.0, clearance_weight=1.0)
     assert cost(9.0, 0.0, settings, known=False) == round(252 * 3 / 4)
 
@@ -83,7 +83,7 @@ def test_the_four_costs_of_nav2_are_where_they_belong() -> None:
     np.testing.assert_array_equal(costmap.steps[:, 0], [ONE, DIAGONAL])
 
 
-def test_a_move_through_the_dearest_cells_costs_one_plus_the_weight() -> None:
+def test_a_move_through_the_most_expensive_cells_costs_one_plus_the_weight() -> None:
     settings = CostSettings(confidence_weight=2.0, clearance_weight=1.0)
     problem = PlanningProblem(
         grid_of(free_field(8, 8)), start=(4, 4), goal=(5, 5), footprint=0, costs=settings
@@ -94,7 +94,7 @@ def test_a_move_through_the_dearest_cells_costs_one_plus_the_weight() -> None:
     assert (np.diff(steps, axis=1) > 0).all()
 
 
-def test_penalised_unknown_space_is_open_and_dear() -> None:
+def test_penalised_unknown_space_is_traversable_at_extra_cost() -> None:
     z = np.where(np.arange(20) < 10, FREE, UNSEEN) * np.ones((20, 1))
     problem = PlanningProblem(
         grid_of(z), start=(3, 10), goal=(17, 10), footprint=1, unknown="penalise", clear_start=False

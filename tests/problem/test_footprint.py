@@ -45,7 +45,7 @@ def test_a_number_is_a_disc(radius: float) -> None:
     assert disc.width == 2 * float(radius)
 
 
-def test_a_polygon_knows_its_discs_and_its_width() -> None:
+def test_a_polygon_has_covering_discs_and_a_width() -> None:
     square = Footprint.of(SQUARE)
     assert (square.radius, square.inscribed_radius) == (math.sqrt(2), 1.0)
     assert square.width == pytest.approx(2.0)
@@ -80,7 +80,7 @@ def test_discs_and_width_are_those_of_the_polygon(rng: np.random.Generator) -> N
 
 @given(rngs())
 @settings(max_examples=20)
-def test_what_it_writes_it_reads(rng: np.random.Generator) -> None:
+def test_written_values_can_be_read(rng: np.random.Generator) -> None:
     points = star(rng)
     assume(shapely.Polygon(points).is_valid)
     written = Footprint.of(points).to_value()
@@ -108,13 +108,13 @@ def test_corners_cannot_be_changed() -> None:
         ([(0, 0), (1, 0), (1, 0), (0, 0)], "2 different points"),
         ([(0, 0), (1, 1), (2, 2)], "points on one line"),
         ([(0, 0), (math.nan, 1), (2, 2)], "a number that is not finite"),
-        ([(0, 0), (1, 1), (1, 0), (0, 1)], r"one that meets itself at \(0\.5, 0\.5\)"),
-        ([(0, 0), (2, 0), (2, 2), (1, 0), (0, 2)], r"one that meets itself at \(1, 0\)"),
+        ([(0, 0), (1, 1), (1, 0), (0, 1)], r"a self-intersection at \(0\.5, 0\.5\)"),
+        ([(0, 0), (2, 0), (2, 2), (1, 0), (0, 2)], r"a self-intersection at \(1, 0\)"),
         ([1.0, 2.0, 3.0], r"shape \(3,\)"),
         (np.zeros((4, 3)), r"shape \(4, 3\)"),
     ],
 )
-def test_what_is_no_footprint_is_refused(value: Any, got: str) -> None:
+def test_invalid_footprints_are_refused(value: Any, got: str) -> None:
     with pytest.raises(ProblemError, match=f"footprint: expected a radius .*, got {got}"):
         Footprint.of(value)
 

@@ -140,7 +140,7 @@ def test_merging_keeps_the_line_and_its_ends(line: Floats) -> None:
         assert shapely.hausdorff_distance(old, new) < 1e-8
 
 
-def test_headings_follow_the_line_and_end_in_the_yaw_asked_for() -> None:
+def test_headings_follow_the_line_and_end_in_the_requested_yaw() -> None:
     route = straight(goal=(20.5, 18.5))
     assert route.headings.tolist() == [math.pi / 4] * 2
     turned = straight(goal=(20.5, 18.5, -1.0))

@@ -1,4 +1,4 @@
-"""Shortcuts: never longer, never nearer, never dearer; as tight as the obstacles allow."""
+"""Shortcuts: never longer, closer to obstacles or more expensive than the route."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ rngs = st.integers(0, 2**32 - 1).map(np.random.default_rng)
 
 
 def cluttered(rng: np.random.Generator, *, side: int = 60, boxes: int = 40) -> Bools:
-    """Return a map with boxes strewn over it."""
+    """Return a map with boxes scattered over it."""
     blocked = np.zeros((side, side), dtype=np.bool_)
     for _ in range(boxes):
         row, col = rng.integers(0, side, 2)
@@ -84,7 +84,7 @@ def test_among_single_cells_no_corner_is_touched_that_the_route_did_not(
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_clearance_asked_for_is_kept_where_the_route_kept_it(seed: int) -> None:
+def test_a_requested_clearance_is_kept_where_the_route_kept_it(seed: int) -> None:
     rng = np.random.default_rng(seed)
     start, goal = np.array([[1.5, 1.5], [58.5, 58.5]])
     blocked = cluttered(rng, boxes=25)
@@ -128,7 +128,7 @@ def test_around_the_end_of_a_wall_it_is_a_taut_string(radius: float) -> None:
 
 @given(rngs)
 @settings(max_examples=15)
-def test_where_cells_cost_extra_it_is_never_dearer(rng: np.random.Generator) -> None:
+def test_with_costs_it_is_never_more_expensive(rng: np.random.Generator) -> None:
     z = np.where(cluttered(rng), BLOCKED, rng.uniform(-1, -0.1, (60, 60)))
     costs = CostSettings(clearance_weight=rng.uniform(0, 5), confidence_weight=rng.uniform(0.1, 5))
     ends = rng.uniform(1, 59, (2, 2))
@@ -155,7 +155,7 @@ def added_up(costmap: Costmap, line: Floats) -> float:
     return float(((1 + extra) * parts.lengths).sum()) * costmap.window.resolution
 
 
-def test_a_detour_around_dear_ground_is_not_cut_short() -> None:
+def test_a_detour_around_expensive_cells_is_not_cut_short() -> None:
     z = free_field(64, 64)
     z[10:30, 20:40] = -0.02
     problem = PlanningProblem(
@@ -167,8 +167,8 @@ def test_a_detour_around_dear_ground_is_not_cut_short() -> None:
     )
     route = plan(problem)
     tight = shortcut(problem, route)
-    dear = shapely.box(20, 10, 40, 30)
-    assert shapely.LineString(tight.waypoints).intersection(dear).length < 1.0
+    expensive = shapely.box(20, 10, 40, 30)
+    assert shapely.LineString(tight.waypoints).intersection(expensive).length < 1.0
     assert tight.length < route.length
     assert shortcut(replace(problem, costs=CostSettings()), route).length < 53.01
 
@@ -178,7 +178,7 @@ def test_a_detour_around_dear_ground_is_not_cut_short() -> None:
 
 @given(masks(side=12), rngs, st.floats(0.01, 3.0))
 @settings(max_examples=100)
-def test_a_segment_keeps_a_distance_if_shapely_says_so(
+def test_whether_a_segment_keeps_a_distance_agrees_with_shapely(
     blocked: Bools, rng: np.random.Generator, need: float
 ) -> None:
     a, b = rng.uniform(0, blocked.shape[::-1], (2, 2))
@@ -193,7 +193,7 @@ def test_a_segment_keeps_a_distance_if_shapely_says_so(
 
 @given(rngs, st.booleans())
 @settings(max_examples=60)
-def test_what_a_leg_costs_is_added_up_over_the_cells_it_crosses(
+def test_the_cost_of_a_leg_is_the_sum_over_the_crossed_cells(
     rng: np.random.Generator, on_lattice: bool
 ) -> None:
     factors = rng.uniform(1, 9, (7, 8))
@@ -242,7 +242,7 @@ def best_cost(blocked: Bools, points: Floats, need: float, ahead: int) -> float:
     return costs[-1]
 
 
-def test_a_leg_keeps_what_was_kept_by_what_it_replaces() -> None:
+def test_a_leg_keeps_the_clearance_of_the_part_that_it_replaces() -> None:
     blocked: Bools = np.zeros((20, 20), dtype=np.bool_)
     blocked[0, 10] = True
     points = np.array([[2.0, 1.5], [10.5, 9.0], [19.0, 1.5]])
@@ -277,10 +277,10 @@ def test_a_route_of_another_problem_is_refused() -> None:
         shortcut(replace(problem, footprint=7.0), route)
 
 
-def test_a_route_whose_headings_were_decided_on_is_refused() -> None:
+def test_a_route_with_planned_headings_is_refused() -> None:
     problem, route = two_ways()
     turned = replace(route, headings=route.headings + 0.1, planner="hybrid_astar")
-    with pytest.raises(ProblemError, match=r"headings were decided on \(hybrid_astar\)"):
+    with pytest.raises(ProblemError, match=r"with planned headings \(hybrid_astar\)"):
         shortcut(problem, turned)
     looking = replace(problem, goal=(50, 20, 3.0))
     assert shortcut(looking, plan(looking)).headings[-1] == 3.0
@@ -290,7 +290,7 @@ def test_a_map_that_is_not_flat_is_refused() -> None:
     _, route = two_ways()
     grid = ConfidenceGrid(resolution=1.0, origin=(0, 0, 0))
     problem = PlanningProblem(grid, start=(5, 5, 0), goal=(50, 20, 0), footprint=1.0)
-    with pytest.raises(ProblemError, match="expected one on a 2-D map, got one on a 3-D map"):
+    with pytest.raises(ProblemError, match="grid: expected a 2-D map, got a 3-D map"):
         shortcut(problem, route)
 
 

@@ -151,10 +151,12 @@ def test_a_search_that_waits_for_another_is_cancelled_too() -> None:
 
 def test_planners_that_tell_nothing_say_so() -> None:
     with pytest.raises(
-        ProblemError, match="on_improved: expected none, or an anytime planner: 'ara"
+        ProblemError, match="on_improved: expected no such option, or an anytime planner: 'ara"
     ):
         plan(problem(), "jps", on_improved=lambda _: None)
-    with pytest.raises(ProblemError, match="cancel: expected none, or an anytime planner"):
+    with pytest.raises(
+        ProblemError, match="cancel: expected no such option, or an anytime planner"
+    ):
         plan(problem(), "astar", cancel=threading.Event())
     with pytest.raises(ProblemError, match=r"cancel: expected a threading\.Event, got 3"):
         plan(problem(), "rrt", cancel=3)  # type: ignore[arg-type]

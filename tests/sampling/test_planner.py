@@ -283,7 +283,7 @@ def test_a_wall_all_across_is_proved_to_enclose_at_once() -> None:
         asked = PlanningProblem(
             grid_of(z, resolution=0.25), start=(3, 3, 0), goal=(3, 10, 0), footprint=0.3
         )
-        with pytest.raises(EnclosedError, match="fenced in"):
+        with pytest.raises(EnclosedError, match="enclosed"):
             plan(asked, "rrtconnect", space=space, time_limit=None)
 
 

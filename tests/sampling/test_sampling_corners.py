@@ -220,7 +220,7 @@ def test_who_is_at_a_goal_stays_there() -> None:
 def test_a_goal_beyond_the_map_is_none_if_others_will_do() -> None:
     route = plan(asked(goal=(500, 2)), "rrtconnect", goals=[[14, 2]])
     assert route.waypoints[-1].tolist() == [14.0, 2.0]
-    with pytest.raises(OutsideMapError, match=r"^goal \(500.00, 2.00\): outside the map"):
+    with pytest.raises(OutsideMapError, match=r"^goal \(500.00, 2.00\) is outside the map"):
         plan(asked(goal=(500, 2)), "rrtconnect", goals=[[600, 2]])
 
 

@@ -68,7 +68,7 @@ def test_a_seed_repeats_its_route_exactly_and_another_brings_another(name: str) 
 
 @needs_ompl
 def test_walls_without_holes_are_proved_to_enclose_at_once() -> None:
-    with pytest.raises(EnclosedError, match="fenced in"):
+    with pytest.raises(EnclosedError, match="enclosed"):
         plan(problem(rooms(holes=False)), "rrtconnect", time_limit=None)
 
 

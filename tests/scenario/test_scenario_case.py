@@ -78,7 +78,7 @@ goal = [5, 1, 1.5]
 footprint = 0.3
 robot_radius = 0.25
 expect = "EnclosedError"
-reason = "fenced in"
+reason = "enclosed"
 unknown = "allow"
 time_limit = 0.5
 planner = "astar"
@@ -138,7 +138,7 @@ def test_all_that_a_file_says_is_taken_over(tmp_path: Path) -> None:
         footprint=0.3,
         robot_radius=0.25,
         expect="EnclosedError",
-        reason="fenced in",
+        reason="enclosed",
         unknown="allow",
         time_limit=0.5,
         planner="astar",

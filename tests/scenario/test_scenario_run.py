@@ -155,16 +155,16 @@ def test_an_error_that_is_not_expected_fails_with_its_reason(tmp_path: Path) -> 
     assert outcome.passed is False
     (missed,) = outcome.missed
     assert missed.startswith("closed.outcome is EnclosedError, not = route (")
-    assert "fenced in" in missed
+    assert "enclosed" in missed
 
 
 def test_the_sentence_of_an_error_holds_the_reason_that_is_expected(tmp_path: Path) -> None:
     expected = 'expect = "EnclosedError"\nreason = '
     into: dict[str, Any] = {"start": (1.5, 2), "goal": (5, 2)}
-    right = query("right", **into, more=expected + r"'fenced in: .* \d+\.\d m²'")
+    right = query("right", **into, more=expected + r"'enclosed in .* \d+\.\d m²'")
     wrong = query("wrong", **into, more=expected + '"too narrow"')
     outcome = run_scenario(write(tmp_path, ROOMS + right + wrong))
-    assert str(outcome.figures["right.reason"]).startswith("no route: the goal is fenced in: ")
+    assert str(outcome.figures["right.reason"]).startswith("no route: the goal is enclosed in ")
     (missed,) = outcome.missed
     assert re.fullmatch(r"wrong\.reason is no route: .*, not with 'too narrow' in it", missed)
 
@@ -216,7 +216,7 @@ def test_a_query_for_what_does_not_exist_is_refused(
 
 @pytest.mark.parametrize(
     ("footprint", "got"),
-    [("-0.1", "-0.1"), ("[[0, 0], [1, 1], [1, 0], [0, 1]]", "one that meets itself at .*")],
+    [("-0.1", "-0.1"), ("[[0, 0], [1, 1], [1, 0], [0, 1]]", "a self-intersection at .*")],
 )
 def test_a_query_with_what_is_no_footprint_is_refused(
     tmp_path: Path, footprint: str, got: str
@@ -380,7 +380,7 @@ def test_a_bound_holds_what_keeps_to_it_and_nothing_that_is_missing(
 def test_a_bound_reads_as_people_write_it() -> None:
     bounds = Bound(min=0.97), Bound(max=0), Bound(min=1, max=2.5), Bound(equals="route")
     assert [str(bound) for bound in bounds] == ["≥ 0.97", "≤ 0", "≥ 1 and ≤ 2.5", "= route"]
-    assert str(Bound(matches="fenced in")) == "with 'fenced in' in it"
+    assert str(Bound(matches="enclosed")) == "with 'enclosed' in it"
 
 
 def test_a_world_of_too_many_cells_fails_with_what_to_do(

@@ -150,7 +150,7 @@ def test_a_passage_exactly_as_wide_as_the_footprint_is_passed() -> None:
         radius = 1.5 * resolution
         route = plan(PlanningProblem(grid, start=ends[0], goal=ends[1], footprint=radius))
         assert route.min_clearance == pytest.approx(radius, abs=1e-9)
-        with pytest.raises(EnclosedError, match=r"m wide at .*, your footprint needs") as caught:
+        with pytest.raises(EnclosedError, match=r"m wide at .*; the footprint needs") as caught:
             plan(PlanningProblem(grid, start=ends[0], goal=ends[1], footprint=radius * 1.001))
         assert caught.value.widest_gap == pytest.approx(2 * radius)
 

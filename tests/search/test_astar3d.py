@@ -19,8 +19,10 @@ from scipy.sparse.csgraph import dijkstra
 from groundmap.arrays import Bools, Floats
 from groundmap.grid.grid import ConfidenceGrid
 from planners import AuditError, CostSettings, PlanningProblem, ProblemError, TimeLimitError
-from planners.audit.audit3d import audit3d, segment_boxes
-from planners.costmap.voxel_map import Voxels, squared_distances
+from planners.audit.audit import audit
+from planners.audit.boxes import segment_boxes
+from planners.costmap.kernels.distance import NOWHERE, squared_distances_3d
+from planners.costmap.voxel_map import Voxels
 from planners.geometry.kernels.clearance3d import cube_distance, line_clearance
 from planners.search.astar3d import AStar3D
 from planners.search.base import SearchResult, SearchSettings
@@ -92,7 +94,7 @@ def sampled_distance(a: Floats, b: Floats, lower: Floats, upper: Floats) -> floa
 # Voxels
 
 
-@given(masks(), st.integers(1, 60))
+@given(masks(), st.integers(1, 60) | st.just(NOWHERE))
 @settings(max_examples=40)
 def test_squared_distances_are_those_to_the_nearest_blocked_cube(blocked: Bools, cap: int) -> None:
     expected = np.full(blocked.shape, cap)
@@ -100,7 +102,7 @@ def test_squared_distances_are_those_to_the_nearest_blocked_cube(blocked: Bools,
         away = np.abs(np.argwhere(blocked) - at)
         halves = np.maximum(2 * away - 1, 0)
         expected[at] = min([cap, *(halves**2).sum(axis=1).tolist()])
-    np.testing.assert_array_equal(squared_distances(blocked, cap), expected)
+    np.testing.assert_array_equal(squared_distances_3d(blocked, cap), expected)
 
 
 @given(masks(), st.sampled_from(RADII))
@@ -131,7 +133,10 @@ def test_unknown_voxels_near_the_start_count_as_free() -> None:
     [
         ({"grid": ConfidenceGrid(), "start": (0, 0), "goal": (1, 1)}, "grid: expected a 3-D map"),
         ({"unknown": "penalise"}, "unknown: expected 'avoid' or 'allow' on a 3-D map"),
-        ({"costs": CostSettings(clearance_weight=1.0)}, "costs: expected none but length on a 3-D"),
+        (
+            {"costs": CostSettings(clearance_weight=1.0)},
+            "costs: expected no costs except length on a 3-D",
+        ),
         (
             {"clear_start_radius": 500.0},
             "footprint: expected one that leaves 33554432 cells of map",
@@ -230,8 +235,8 @@ def test_routes_pass_the_audit_and_cost_the_same_in_reverse(
     found, reverse = search(there), search(back)
     assert (found is None) == (reverse is None)
     if found is not None and reverse is not None:
-        audit3d(there, found.waypoints)
-        audit3d(back, reverse.waypoints)
+        audit(there, found.waypoints)
+        audit(back, reverse.waypoints)
         assert found.cost == pytest.approx(reverse.cost, abs=1e-9)
         assert Voxels.of(there).clearance_of(found.waypoints) >= radius - 1e-9
 
@@ -339,22 +344,22 @@ def room() -> PlanningProblem:
     [
         (
             [],
-            r"too near to nonfree space \(z 8.50 m\) at \(8.00, 8.50\): expected 0.5 m, got 0 m",
+            r"too close to a non-free cell at \(8.00, 8.50, 8.50\): expected 0.5 m, got 0 m",
         ),
-        ([(8.5, 9.499, 8.5)], r"too near to nonfree space .*: expected 0.5 m, got 0.37"),
-        ([(8.5, 0.4, 8.5)], r"too near to unknown space .*: expected 0.5 m, got 0.4 m"),
+        ([(8.5, 9.499, 8.5)], r"too close to a non-free cell .*: expected 0.5 m, got 0.37"),
+        ([(8.5, 0.4, 8.5)], r"too close to an unknown cell .*: expected 0.5 m, got 0.4 m"),
         ([(8.5, np.nan, 8.5)], "the route is not finite"),
     ],
 )
 def test_a_line_that_comes_too_near_is_found(inner: list[tuple[float, ...]], fault: str) -> None:
     problem = room()
     with pytest.raises(AuditError, match=fault):
-        audit3d(problem, np.array([problem.start, *inner, problem.goal]))
+        audit(problem, np.array([problem.start, *inner, problem.goal]))
 
 
 def test_a_line_that_keeps_its_distance_passes() -> None:
     problem = room()
-    audit3d(problem, np.array([problem.start, (4, 9.5, 8.5), (13, 9.5, 8.5), problem.goal]))
+    audit(problem, np.array([problem.start, (4, 9.5, 8.5), (13, 9.5, 8.5), problem.goal]))
 
 
 @pytest.mark.parametrize(("end", "name"), [(0, "start"), (-1, "goal")])
@@ -363,7 +368,7 @@ def test_a_line_that_ends_elsewhere_is_found(end: int, name: str) -> None:
     waypoints = np.array([problem.start, (4, 9.5, 8.5), (13, 9.5, 8.5), problem.goal])
     waypoints[end, 2] += 1e-6
     with pytest.raises(AuditError, match=f"the route misses the {name}"):
-        audit3d(problem, waypoints)
+        audit(problem, waypoints)
 
 
 def test_a_point_may_go_along_a_cube_and_not_through_it() -> None:
@@ -373,10 +378,10 @@ def test_a_point_may_go_along_a_cube_and_not_through_it() -> None:
         problem = posed(blocked, (4, 8.5, z), (13, 8.5, z), 0.0)
         line = np.array([problem.start, problem.goal])
         if passes:
-            audit3d(problem, line)
+            audit(problem, line)
         else:
-            with pytest.raises(AuditError, match="too near to nonfree space"):
-                audit3d(problem, line)
+            with pytest.raises(AuditError, match="too close to a non-free cell"):
+                audit(problem, line)
 
 
 def test_unknown_voxels_may_be_entered_where_that_was_asked_for() -> None:
@@ -386,7 +391,7 @@ def test_unknown_voxels_may_be_entered_where_that_was_asked_for() -> None:
         grid, start=(4, 8.5, 8.5), goal=(13, 8.5, 8.5), footprint=0.5, clear_start_radius=3.9
     )
     line = np.array([problem.start, problem.goal])
-    audit3d(replace(problem, unknown="allow"), line)
-    audit3d(replace(problem, clear_start_radius=4.0), line)
-    with pytest.raises(AuditError, match="too near to unknown space"):
-        audit3d(problem, line)
+    audit(replace(problem, unknown="allow"), line)
+    audit(replace(problem, clear_start_radius=4.0), line)
+    with pytest.raises(AuditError, match="too close to an unknown cell"):
+        audit(problem, line)

@@ -187,7 +187,7 @@ def test_a_source_that_is_no_place_is_refused(source: object) -> None:
 def test_a_3d_map_is_refused() -> None:
     grid = ConfidenceGrid(resolution=1.0, origin=(0.0, 0.0, 0.0))
     problem = PlanningProblem(grid, start=(0, 0, 0), goal=(1, 1, 1), footprint=0.5)
-    with pytest.raises(ProblemError, match="grid: expected a 2-D map, got one of 3-D"):
+    with pytest.raises(ProblemError, match="grid: expected a 2-D map, got a 3-D map"):
         distance_field(problem, (0, 0))
 
 

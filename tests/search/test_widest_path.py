@@ -303,7 +303,7 @@ def test_from_a_place_to_itself_it_is_as_wide_as_there() -> None:
 
 
 def test_a_corner_that_two_blocked_cells_share_is_no_way() -> None:
-    with pytest.raises(EnclosedError, match="no way from start to goal exists, however narrow"):
+    with pytest.raises(EnclosedError, match="No passage connects start and goal, however narrow"):
         widest_route(problem(drawn("#. .#"), (0.5, 0.5), (1.5, 1.5)))
     assert widest_route(problem(drawn(".. .#"), (0.5, 0.5), (1.5, 1.5))).width == 1.0
 
@@ -334,7 +334,7 @@ def test_places_that_are_none_are_refused() -> None:
     grid = two_rooms((30, 40, 43))
     with pytest.raises(NonFreeError, match=r"goal \(30.50, 9.50\): .* non-free space"):
         widest_route(problem(grid, (10.5, 9.5), (30.5, 9.5)))
-    with pytest.raises(OutsideMapError, match=r"goal \(90.00, 9.50\): outside the map"):
+    with pytest.raises(OutsideMapError, match=r"goal \(90.00, 9.50\) is outside the map"):
         widest_route(problem(grid, (10.5, 9.5), (90, 9.5)))
 
 
@@ -342,7 +342,7 @@ def test_a_map_in_three_dimensions_is_refused() -> None:
     asked = PlanningProblem(
         ConfidenceGrid(origin=(0, 0, 0)), start=(1, 1, 1), goal=(2, 2, 2), footprint=0.1
     )
-    with pytest.raises(ProblemError, match="grid: expected a 2-D map, got one of 3-D"):
+    with pytest.raises(ProblemError, match="grid: expected a 2-D map, got a 3-D map"):
         widest_route(asked)
 
 

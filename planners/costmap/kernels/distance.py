@@ -1,11 +1,11 @@
 """Exact distances from cell centres to the nearest blocked square.
 
 In half cells, a centre is at (2 col + 1, 2 row + 1) and a square spans two units, so squared
-distances are integers. The transform is separable: down a column, the nearest blocked square is k
-rows away, 2 k - 1 half cells (0 if it is the cell itself); along a row, a square to the left is
-nearest at its right border, one to the right at its left border. A column's border therefore
-carries the smaller of its two columns' squares, and what remains is the lower envelope of
-parabolas of Felzenszwalb and Huttenlocher (2012), over integers.
+distances are integers. The transform is separable. Down a column, a blocked square k rows away is
+2 k - 1 half cells away (0 for k = 0). Along a row, the nearest point of a square to the left is on
+its right border, and that of a square to the right on its left border. Each border between two
+columns therefore carries the smaller squared distance of the two, and the remaining step is the
+lower envelope of parabolas (Felzenszwalb and Huttenlocher 2012), over integers.
 """
 
 from __future__ import annotations
@@ -54,6 +54,56 @@ def squared_distances(blocked: Bools, cap: int) -> Ints32:
 
 
 @njit(cache=True, nogil=True)
+def squared_distances_3d(blocked: Bools, cap: int) -> Ints32:
+    """Return the squared distance of every voxel's centre to the nearest blocked cube.
+
+    Each layer is transformed as in 2-D, then the columns across layers, where cubes begin
+    2 k - 1 half voxels away like squares.
+
+    Parameters
+    ----------
+    blocked : ndarray of bool, shape (layers, rows, cols)
+    cap : int [(half voxels)²]
+        Larger ones are cut to this; at most `NOWHERE`.
+
+    Returns
+    -------
+    ndarray of int32, shape (layers, rows, cols) [(half voxels)²]
+    """
+    layers, rows, cols = blocked.shape
+    squared = np.empty((layers, rows, cols), dtype=np.int32)
+    for layer in range(layers):
+        squared[layer] = squared_distances(blocked[layer], NOWHERE)
+    within = np.empty((cols, layers), dtype=np.int64)
+    room = layers + 1
+    border, at = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
+    starts = np.empty(room, dtype=np.int64)
+    for row in range(rows):
+        for layer in range(layers):
+            for col in range(cols):
+                within[col, layer] = squared[layer, row, col]
+        for col in range(cols):
+            _across_layers(within[col], border, at, starts)
+        for layer in range(layers):
+            for col in range(cols):
+                squared[layer, row, col] = min(within[col, layer], cap)
+    return squared
+
+
+@njit(cache=True, nogil=True)
+def _across_layers(within: Ints, border: Ints, at: Ints, starts: Ints) -> None:
+    """Turn squared distances within the layers of a column into distances over all layers."""
+    size, k = envelope(within, border, at, starts), 0
+    for layer in range(len(within)):
+        x = 2 * layer + 1
+        if size > 0:
+            while k + 1 < size and starts[k + 1] <= x:
+                k += 1
+            away = x - at[k]
+            within[layer] = min(within[layer], away * away + border[k])
+
+
+@njit(cache=True, nogil=True)
 def _down_columns(blocked: Bools) -> Ints:
     """Return the squared vertical distance to the nearest blocked square of the same column."""
     rows, cols = blocked.shape
@@ -81,9 +131,16 @@ def _down_columns(blocked: Bools) -> Ints:
 
 @njit(cache=True, nogil=True)
 def envelope(vertical: Ints, border: Ints, at: Ints, starts: Ints) -> int:
-    """Write the lower envelope of the borders' parabolas and return how many it has.
+    """Write the lower envelope of the parabolas of the borders and return their number.
 
-    Parabola k is ``(x - at[k])² + border[k]``, the lowest from ``starts[k]`` on.
+    Parabola k is ``(x - at[k])² + border[k]``, which is the lowest from ``starts[k]`` on.
+
+    Parameters
+    ----------
+    vertical : ndarray of int64, shape (cols,)
+        Squared distances within the columns; `NOWHERE` or more for none.
+    border, at, starts : ndarray of int64, shape (cols + 1,)
+        Receive the parabolas.
     """
     cols, size = len(vertical), 0
     for b in range(cols + 1):

@@ -1,6 +1,6 @@
 """The eight moves between cells and their integer costs.
 
-A cell's side costs `ONE`, its diagonal `DIAGONAL`. Moves are bits: bit k of ``moves[node]`` says
+A cell's side costs `ONE`, its diagonal `DIAGONAL`. Moves are bits: bit k of ``moves[node]`` tells
 whether the step (ROWS[k], COLS[k]) is allowed, counter-clockwise from east (+x): E, NE, N, NW, W,
 SW, S, SE.
 """

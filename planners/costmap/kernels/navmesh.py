@@ -1,7 +1,7 @@
-"""Triangles merged into convex polygons, what leads nowhere, and which polygon a point is in.
+"""Merging triangles into convex polygons, finding dead ends, and locating points.
 
 Polygons are rings of sides, counter-clockwise: a side has a first corner, a next side, and a twin
-that is the same line as a side of the polygon beyond (-1: nothing is beyond).
+that is the same segment as a side of the adjacent polygon (-1: no adjacent polygon).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ PLAIN, CORNER, GATE, PINCH = range(4)  # kinds of vertices
 
 @njit(cache=True, nogil=True)
 def merge(points: Floats, corners: Ints, twins: Ints, order: Ints) -> tuple[Ints, Ints, Ints]:
-    """Merge triangles whose union is strictly convex, as far as that goes.
+    """Merge triangles into strictly convex polygons, greedily.
 
     Parameters
     ----------
@@ -25,14 +25,14 @@ def merge(points: Floats, corners: Ints, twins: Ints, order: Ints) -> tuple[Ints
     corners, twins : ndarray of int64, shape (3 t,)
         First corner and twin of every side, three to a triangle.
     order : ndarray of int64, shape (n,)
-        Sides to remove, if their ends allow it, in that order.
+        Sides to remove where the merged polygon stays convex, in that order.
 
     Returns
     -------
     first : ndarray of int64, shape (p + 1,)
         Where each polygon's sides begin.
     corners, twins : ndarray of int64, shape (s,)
-        The same of the sides that are left.
+        First corner and twin of the remaining sides.
     """
     sides = len(corners)
     following = np.empty(sides, dtype=np.int64)
@@ -60,7 +60,14 @@ def merge(points: Floats, corners: Ints, twins: Ints, order: Ints) -> tuple[Ints
 
 @njit(cache=True, nogil=True)
 def turn(points: Floats, a: int, b: int, c: int) -> float:
-    """Return how far c lies left of the way from a to b; below 0 it lies to the right."""
+    """Return twice the signed area of the triangle a, b, c: positive if c is left of a-b.
+
+    Parameters
+    ----------
+    points : ndarray, shape (v, 2)
+    a, b, c : int
+        Rows of `points`.
+    """
     x, y = points[a, 0], points[a, 1]
     off = (points[b, 0] - x) * (points[c, 1] - y) - (points[b, 1] - y) * (points[c, 0] - x)
     return float(off)
@@ -68,7 +75,7 @@ def turn(points: Floats, a: int, b: int, c: int) -> float:
 
 @njit(cache=True, nogil=True)
 def _rings(corners: Ints, twins: Ints, following: Ints, gone: Bools) -> tuple[Ints, Ints, Ints]:
-    """Count the sides that are left anew, ring by ring."""
+    """Renumber the remaining sides, ring by ring."""
     number = np.full(len(corners), -1, dtype=np.int64)
     old = np.empty(len(corners), dtype=np.int64)
     firsts, count = [0], 0
@@ -89,10 +96,10 @@ def _rings(corners: Ints, twins: Ints, following: Ints, gone: Bools) -> tuple[In
 
 @njit(cache=True, nogil=True)
 def exits(first: Ints, twins: Ints, owner: Ints, through: Bools) -> Ints:
-    """Return the side of each polygon that alone leads out of a dead end; -1 outside dead ends.
+    """Return the only side that leads out of each polygon in a dead end; -1 for other polygons.
 
-    A polygon is a dead end if only one of its sides leads to polygons that are none. What lies in
-    a dead end only matters if a route begins or ends there.
+    A polygon is a dead end if exactly one of its sides leads to a polygon that is not one. Routes
+    only visit a dead end if they begin or end there.
 
     Parameters
     ----------
@@ -100,7 +107,7 @@ def exits(first: Ints, twins: Ints, owner: Ints, through: Bools) -> Ints:
     owner : ndarray of int64, shape (s,)
         Polygon of each side.
     through : ndarray of bool, shape (p,)
-        Polygons with another way out than their sides: never dead ends.
+        Polygons with an exit other than their sides, which are never dead ends.
     """
     polygons = len(first) - 1
     found = np.full(polygons, -1, dtype=np.int64)
@@ -162,10 +169,10 @@ def around(
     boxes : ndarray of int64, shape (p, 4)
         Least x, y and largest x, y of each polygon.
     nearby : ndarray of int64, shape (n,)
-        Polygons to look at.
+        Polygons to check.
     x, y : float
     slack : float
-        Twice the area of the triangle that the point may form with a side it lies beyond.
+        Tolerance: twice the area of the triangle of the point and a side that it lies beyond.
     """
     found = []
     for polygon in nearby:

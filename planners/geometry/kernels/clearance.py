@@ -17,7 +17,14 @@ from groundmap.arrays import Bools, Floats
 def square_distance(ax: float, ay: float, bx: float, by: float, col: int, row: int) -> float:
     """Return the distance from the segment a-b to the square of a cell; 0 where they touch.
 
-    Two convex sets that don't meet are nearest at a vertex of one of them.
+    Two disjoint convex polygons are nearest at a vertex of one of them.
+
+    Parameters
+    ----------
+    ax, ay, bx, by : float [cells]
+        Ends of the segment.
+    col, row : int
+        The cell.
     """
     if _meets(ax, ay, bx, by, col, row):
         return 0.0
@@ -35,7 +42,15 @@ def segment_clearance(
     """Return the distance from the segment a-b to the nearest blocked square, at most `limit`.
 
     Rings of cells around the segment's box are searched outwards. A cell in ring k is k - 1 whole
-    cells away from the box, so the search ends once that is no less than the best found.
+    cells away from the box, so the search ends once that is not less than the best distance.
+
+    Parameters
+    ----------
+    blocked : ndarray of bool, shape (rows, cols)
+    ax, ay, bx, by : float [cells]
+        Ends of the segment.
+    limit : float [cells]
+        Largest distance to search.
     """
     rows, cols = blocked.shape
     left, right = math.floor(min(ax, bx)), math.floor(max(ax, bx))
@@ -62,16 +77,16 @@ def line_clearance(blocked: Bools, points: Floats, limit: float = math.inf) -> f
     ----------
     blocked : ndarray of bool, shape (rows, cols)
     points : ndarray, shape (n, 2) [cells]
-    limit : float [cells]
-        Nothing farther away is looked for.
+    limit : float, default inf [cells]
+        Largest distance to search.
 
     Notes
     -----
-    Segments are cut into pieces of at most a cell, whose boxes are small, and each piece is only
-    asked whether it betters the pieces before it.
+    Segments are cut into pieces of at most a cell, whose boxes are small, and each piece is
+    searched only up to the best distance of the pieces before it.
     """
     best = segment_clearance(blocked, points[0, 0], points[0, 1], points[0, 0], points[0, 1], limit)
-    if math.isinf(best):  # the whole map was looked at
+    if math.isinf(best):  # the whole map was searched
         return best
     for i in range(len(points) - 1):
         ax, ay = points[i]

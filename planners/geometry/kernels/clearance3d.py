@@ -13,15 +13,22 @@ from numba import njit
 
 from groundmap.arrays import Bools, Floats
 
-HALVINGS = 60  # of a piece: beyond what a float tells apart
+HALVINGS = 60  # of a piece: beyond the resolution of floats
 
 
 @njit(cache=True, nogil=True)
 def cube_distance(a: Floats, b: Floats, x: int, y: int, z: int) -> float:
     """Return the distance from the segment a-b to the cube of voxel [z, y, x].
 
-    Along the segment, the squared distance is convex: its minimum is where its slope, half of
-    which is `_slope`, changes sign.
+    The squared distance is convex along the segment: its minimum is where its slope, twice
+    `_slope`, changes sign.
+
+    Parameters
+    ----------
+    a, b : ndarray, shape (3,) [voxels]
+        Ends of the segment.
+    x, y, z : int
+        The voxel.
     """
     low, high = 0.0, 1.0
     if _slope(a, b, x, y, z, low) >= 0.0:
@@ -47,7 +54,15 @@ def segment_clearance(blocked: Bools, a: Floats, b: Floats, limit: float) -> flo
     """Return the distance from the segment a-b to the nearest blocked cube, at most `limit`.
 
     Shells of voxels around the segment's box are searched outwards. A voxel in shell k is k - 1
-    whole voxels away from the box, so the search ends once that is no less than the best found.
+    whole voxels away from the box, so the search ends once that is not less than the best distance.
+
+    Parameters
+    ----------
+    blocked : ndarray of bool, shape (layers, rows, cols)
+    a, b : ndarray, shape (3,) [voxels]
+        Ends of the segment.
+    limit : float [voxels]
+        Largest distance to search.
     """
     layers, rows, cols = blocked.shape
     left, right = math.floor(min(a[0], b[0])), math.floor(max(a[0], b[0]))
@@ -76,16 +91,16 @@ def line_clearance(blocked: Bools, points: Floats, limit: float = math.inf) -> f
     ----------
     blocked : ndarray of bool, shape (layers, rows, cols)
     points : ndarray, shape (n, 3) [voxels]
-    limit : float [voxels]
-        Nothing farther away is looked for.
+    limit : float, default inf [voxels]
+        Largest distance to search.
 
     Notes
     -----
-    Segments are cut into pieces of at most a voxel, whose boxes are small, and each piece is only
-    asked whether it betters the pieces before it.
+    Segments are cut into pieces of at most a voxel, whose boxes are small, and each piece is
+    searched only up to the best distance of the pieces before it.
     """
     best = segment_clearance(blocked, points[0], points[0], limit)
-    if math.isinf(best):  # the whole map was looked at
+    if math.isinf(best):  # the whole map was searched
         return best
     for i in range(len(points) - 1):
         step = points[i + 1] - points[i]
@@ -98,7 +113,7 @@ def line_clearance(blocked: Bools, points: Floats, limit: float = math.inf) -> f
 
 @njit(cache=True, nogil=True)
 def _gap(position: float, corner: int) -> float:
-    """Return how far a coordinate is beyond a cube's interval: negative below it."""
+    """Return how far a coordinate lies outside the interval of a cube: negative below it."""
     if position < corner:
         return position - corner
     return max(position - corner - 1.0, 0.0)

@@ -1,16 +1,17 @@
 """Shortest curves of bounded curvature: forward (Dubins 1957), both ways (Reeds and Shepp 1990).
 
 Lengths are in turning radii. A curve starts at the origin with yaw 0; arcs turn left (+1) or right
-(-1), straights turn by 0; a negative length is driven backwards.
+(-1), straights turn by 0; a negative length is driven in reverse.
 
-One derivation serves all words. Write points as complex numbers. An arc to the left, driven at
-yaw a from p, turns about p + i e^(ia); one to the right about p - i e^(ia). Let d be the vector
-from the centre of the first arc, i for a left turn, to that of the last, which the goal fixes.
-Seen at the yaw t in which the first arc ends, it is a vector D that depends on what lies in
-between only: a straight of length s at yaw a adds s e^(ia), a change from left to right -2i e^(ia),
-and back +2i e^(ia). So |D| = |d| gives the one unknown in between, arg d - arg D gives t, and the
-goal's yaw the last arc. Words that begin with a right turn are those of the mirrored goal; words
-in the other gear those of the goal seen from a robot that faces the other way.
+One derivation covers all words. Write points as complex numbers. An arc to the left that starts at
+p with yaw a turns about p + i e^(ia), an arc to the right about p - i e^(ia). Let d be the vector
+from the centre of the first arc, i for a left turn, to that of the last, which the goal determines.
+In a frame rotated by the yaw t at which the first arc ends, it is a vector D that depends only on
+the pieces in between: a straight of length s at yaw a adds s e^(ia), a change from left to right
+-2i e^(ia), and a change back +2i e^(ia). So |D| = |d| gives the one unknown in between,
+arg d - arg D gives t, and the goal's yaw gives the last arc. Words that begin with a right turn are
+those of the mirrored goal; words in the other gear are those of the goal relative to a robot that
+faces the opposite direction.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ from groundmap.arrays import Floats, Ints
 
 SEGMENTS = 5  # of the longest word
 TURN, QUARTER = 2.0 * math.pi, 0.5 * math.pi
-NEAR = 1e-12  # what rounding may lack
-# Both ways, to begin with a left turn, and those that Dubins' forward motion shares: 0, 1 and 2.
+NEAR = 1e-12  # tolerance for rounding
+# Words of both gears that begin with a left turn; Dubins curves use the first three.
 LSL, LSR, LRL, LRLR, LRLR_CUSPS, LRSL, LRSR, LRSLR = range(8)
 TURNS = np.array(
     [
@@ -45,7 +46,7 @@ COUNTS = np.array([3, 3, 3, 4, 4, 4, 4, 5], dtype=np.int64)
 
 @njit(cache=True, nogil=True)
 def wrap(angle: float) -> float:
-    """Return the angle in [-pi, pi] that differs by whole turns."""
+    """Return the equivalent angle in [-pi, pi]."""
     return angle - TURN * round(angle / TURN)
 
 
@@ -56,9 +57,9 @@ def dubins_word(x: float, y: float, yaw: float, lengths: Floats, turns: Ints) ->
     Parameters
     ----------
     x, y, yaw : float [turning radii; rad]
-        The goal, seen from the start.
+        The goal relative to the start.
     lengths, turns : ndarray, shape (5,)
-        Receive the segments, those not needed with length 0.
+        Receive the segments; unused ones have length 0.
     """
     best = math.inf
     for mirror in (1, -1):
@@ -74,7 +75,7 @@ def dubins_word(x: float, y: float, yaw: float, lengths: Floats, turns: Ints) ->
                     continue
                 middle, turned = math.sqrt(max(square - 4.0, 0.0)), 0.0
                 angle = math.atan2(-2.0, middle)
-            else:  # the arc in between may turn by more than half a turn; only that is shortest
+            else:  # the shortest one has a middle arc of more than half a turn
                 if square > 16.0 + NEAR:
                     continue
                 middle = TURN - 2.0 * math.asin(min(math.sqrt(square) / 4.0, 1.0))
@@ -100,19 +101,19 @@ def reeds_shepp_word(
     Parameters
     ----------
     x, y, yaw : float [turning radii; rad]
-        The goal, seen from the start.
+        The goal relative to the start.
     reverse : float
-        Cost of a length driven backwards; 1 to ask for the shortest curve.
+        Cost per length in reverse; 1 gives the shortest curve.
     cusp : float [turning radii]
-        Cost of a change of gear; 0 to ask for the shortest curve.
+        Cost of a change of gear; 0 gives the shortest curve.
     lengths, turns : ndarray, shape (5,)
-        Receive the segments, those not needed with length 0.
+        Receive the segments; unused ones have length 0.
     """
     best = math.inf
     trial = np.zeros(SEGMENTS)
     for backwards in (False, True):
-        # For words that differ when read from the end: seen from the goal, facing the other way,
-        # the same segments in reversed order lead to the start.
+        # Some words differ from their reversal. Relative to the goal, facing the opposite
+        # direction, the same segments in reversed order lead to the start.
         to_x, to_y = x, y
         if backwards:
             to_x = x * math.cos(yaw) + y * math.sin(yaw)
@@ -136,14 +137,14 @@ def reeds_shepp_word(
 
 @njit(cache=True, nogil=True)
 def _centres(x: float, y: float, yaw: float) -> tuple[float, float, float, float]:
-    """Return the vectors from the first left turn's centre to the goal's left and right turn's."""
+    """Return the vectors from the centre of the first left turn to both centres at the goal."""
     sine, cosine = math.sin(yaw), math.cos(yaw)
     return x - sine, y + cosine - 1.0, x + sine, y - cosine - 1.0
 
 
 @njit(cache=True, nogil=True)
 def _solve(word: int, x: float, y: float, yaw: float, to_left: bool, trial: Floats) -> bool:
-    """Write the lengths of a word whose turning centres lie (x, y) apart; False if it has none."""
+    """Write the lengths of a word whose turning centres are (x, y) apart; False if impossible."""
     square = x * x + y * y
     distance = math.sqrt(square)
     beyond = math.sqrt(max(square - 4.0, 0.0))
@@ -212,7 +213,7 @@ def _store(
 
 @njit(cache=True, nogil=True)
 def _ahead(angle: float) -> float:
-    """Return the angle in [0, 2 pi) that differs by whole turns; nearly a whole turn is none."""
+    """Return the equivalent angle in [0, 2 pi); nearly a whole turn is 0."""
     angle -= TURN * math.floor(angle / TURN)
     return 0.0 if angle > TURN - NEAR else angle
 
@@ -221,7 +222,16 @@ def _ahead(angle: float) -> float:
 def along(
     x: float, y: float, yaw: float, curvature: float, length: float
 ) -> tuple[float, float, float]:
-    """Return the pose that a piece of constant curvature leads to."""
+    """Return the pose at the end of a piece of constant curvature.
+
+    Parameters
+    ----------
+    x, y, yaw : float [any length; rad]
+        The pose at its beginning.
+    curvature : float [1 / length]
+    length : float
+        Negative in reverse.
+    """
     if curvature == 0.0:
         return x + length * math.cos(yaw), y + length * math.sin(yaw), yaw
     after = yaw + curvature * length

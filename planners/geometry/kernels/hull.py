@@ -1,11 +1,11 @@
-"""Convex hulls of a few points, and whether they overlap blocked cells.
+"""Convex hulls of a few points, and their overlap with blocked cells.
 
 Positions are in cells: x grows with the column, and cell [row, col] is the closed square from
 (col, row) to (col + 1, row + 1).
 
 A convex shape meets exactly those cells of a row whose columns overlap the extent in x of its part
-within the row. So its outline is clipped row by row, and a running count of blocked cells answers
-for all columns between the two ends at once.
+within the row. Its outline is therefore clipped row by row, and a running count of blocked cells
+covers all columns between the two ends at once.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from groundmap.arrays import Floats, Ints
 
 @njit(cache=True, nogil=True)
 def hull_of(points: Floats) -> Floats:
-    """Return the convex hull of a few points, closed (Andrew 1979). Sorts them in place."""
+    """Return the convex hull of a few points, closed (Andrew 1979); sorts them in place."""
     n = len(points)
     for i in range(1, n):
         x, y = points[i]
@@ -32,7 +32,7 @@ def hull_of(points: Floats) -> Floats:
     hull = np.empty((2 * n + 1, 2))
     size = turned = 0
     for i in range(2 * n - 1):
-        at = i if i < n else 2 * n - 2 - i  # there along the lower side, and back along the upper
+        at = i if i < n else 2 * n - 2 - i  # along the lower side, then back along the upper
         kept = 2 if i < n else turned + 1
         while size >= kept and not _turns_left(hull, size, points[at, 0], points[at, 1]):
             size -= 1
@@ -52,7 +52,15 @@ def _turns_left(hull: Floats, size: int, x: float, y: float) -> bool:
 
 @njit(cache=True, nogil=True)
 def hull_clear(before: Ints, hull: Floats, grow: float) -> bool:
-    """Whether a closed convex outline, grown by `grow` in x and y, overlaps no blocked square."""
+    """Whether a closed convex outline, grown in x and y, overlaps no blocked square.
+
+    Parameters
+    ----------
+    before : ndarray of int64, shape (rows, cols + 1)
+        Number of blocked cells of the row with a smaller column.
+    hull : ndarray, shape (n, 2) [cells]
+    grow : float [cells]
+    """
     rows, cols = before.shape[0], before.shape[1] - 1
     low = max(math.floor(hull[:, 1].min() - grow), 0)
     high = min(math.floor(hull[:, 1].max() + grow), rows - 1)
@@ -74,7 +82,14 @@ def hull_clear(before: Ints, hull: Floats, grow: float) -> bool:
 def clip_extent(
     ax: float, ay: float, bx: float, by: float, low: float, high: float
 ) -> tuple[float, float]:
-    """Return the extent in x of the part of a segment between two heights; (inf, -inf) if none."""
+    """Return the extent in x of the part of a segment between two heights; (inf, -inf) if none.
+
+    Parameters
+    ----------
+    ax, ay, bx, by : float [cells]
+        Ends of the segment.
+    low, high : float [cells]
+    """
     if max(ay, by) < low or min(ay, by) > high:
         return math.inf, -math.inf
     if ay == by:

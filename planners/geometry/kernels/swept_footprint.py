@@ -1,8 +1,8 @@
-"""Whether a footprint, posed or moved, overlaps blocked cells.
+"""Overlap of a footprint, at a pose or along a motion, with blocked cells.
 
 Positions are in cells: x grows with the column, and cell [row, col] is the closed square from
-(col, row) to (col + 1, row + 1). Touching a square is no overlap. What lies beyond the array is
-not looked at.
+(col, row) to (col + 1, row + 1). Touching a square is not an overlap. Everything outside the array
+is ignored.
 """
 
 from __future__ import annotations
@@ -20,27 +20,25 @@ from planners.geometry.kernels.hull import clip_extent, hull_clear, hull_of
 
 
 class Ground(NamedTuple):
-    """The map, as these kernels read it."""
+    """The map as an argument of these kernels."""
 
     blocked: Bools  #: shape (rows, cols)
     before: Ints  #: shape (rows, cols + 1); blocked cells of the row with a smaller column
-    clearance: (
-        Floats  #: shape (rows, cols) [cells]; from cell centres to the nearest blocked square
-    )
+    clearance: Floats  #: shape (rows, cols) [cells]; of cell centres
 
 
 class Shape(NamedTuple):
-    """A footprint, as these kernels read it; lengths in cells."""
+    """A footprint as an argument of these kernels; lengths in cells."""
 
-    corners: Floats  #: shape (n, 2); of its convex parts, each counter-clockwise; a disc has none
+    corners: Floats  #: shape (n, 2); of its convex parts, counter-clockwise; empty for a disc
     begins: Ints  #: shape (parts + 1,); rows of `corners`
     discs: Floats  #: shape (k, 3); x, y, radius of discs that together cover it
-    radius: float  #: of a disc; of a polygon 0
-    arm: float  #: how far a turn about the origin can move any of it, per radian; of a disc 0
-    spike: float  #: how far the corners of an outline move out at most per distance it is grown
+    radius: float  #: of a disc; 0 for a polygon
+    arm: float  #: largest distance of its points from the origin; 0 for a disc
+    spike: float  #: largest distance that a corner moves out per distance the outline is grown
     inscribed: float  #: of the largest disc about the origin within it
-    bulge: float  #: how far a motion may leave the hulls of the poses that it is cut into
-    touch: float  #: overlap that is put down to rounding
+    bulge: float  #: how far a motion may leave the hulls of the poses it is cut into
+    touch: float  #: overlap that is attributed to rounding
 
 
 @njit(cache=True, nogil=True)
@@ -53,20 +51,20 @@ def pose_clear(
     sine: float,
     touch: float,
 ) -> bool:
-    """Whether a simple polygon, concave ones too, placed at a pose overlaps no blocked square.
+    """Whether a simple polygon, convex or not, overlaps no blocked square at a pose.
 
     Parameters
     ----------
     blocked : ndarray of bool, shape (rows, cols)
     polygon : ndarray, shape (n, 2) [cells, base_link]
     x, y, cosine, sine : float [cells]
-        Where base_link is, and its yaw.
+        Position of base_link, and cosine and sine of its yaw.
     touch : float [cells]
-        Overlap that is put down to rounding.
+        Overlap that is attributed to rounding.
 
     Notes
     -----
-    A square that no side enters lies within or without as a whole: its centre tells.
+    A square that no side enters is entirely inside or outside, and so is its centre.
     """
     rows, cols = blocked.shape
     n = len(polygon)
@@ -102,10 +100,17 @@ def pose_clear(
 
 @njit(cache=True, nogil=True)
 def cuts(shape: Shape, curvature: float, length: float) -> int:
-    """Return into how many steps a motion is cut.
+    """Return the number of steps into which a motion is cut.
 
-    Poses are then no more than half a cell apart, and where the motion turns, no point of the
-    footprint leaves the chord between its places in two of them by more than `Shape.bulge`.
+    Consecutive poses are at most half a cell apart. Where the motion turns, no point of the
+    footprint leaves the chord between its positions at two of them by more than `Shape.bulge`.
+
+    Parameters
+    ----------
+    shape : Shape
+    curvature : float [1 / cells]
+    length : float [cells]
+        Negative in reverse.
     """
     pieces = math.ceil(2.0 * abs(length))
     if curvature != 0.0:
@@ -125,27 +130,27 @@ def motion_clear(
     curvature: float,
     length: float,
 ) -> bool:
-    """Whether the footprint overlaps no blocked square all along a motion that keeps to the map.
+    """Whether the footprint stays on the map and overlaps no blocked square along a motion.
 
-    The motion is cut into steps. Of each, the convex hull of every convex part in its two poses is
-    looked at, grown by what the turn in between may add: no more than that is ever covered.
+    The motion is cut into steps. For each step, the convex hull of every convex part at its two
+    poses is checked, grown by the most that the turn in between may add.
 
     Parameters
     ----------
     ground : Ground
     shape : Shape
     x, y, yaw : float [cells; rad]
-        Where the motion begins.
+        Pose at the beginning.
     curvature : float [1 / cells]
     length : float [cells]
-        Negative: backwards.
+        Negative in reverse.
     """
     steps = cuts(shape, curvature, length)
     turn = abs(curvature * length)
     grow = 0.0
     if turn > 0.0:
-        # No point strays farther from its chord. Who sweeps the poses only, with sharp corners to
-        # the outline, may find more: where a corner is sharp, and base_link's circle small.
+        # The largest distance of a point from its chord, or of a sharp corner of the outline once
+        # the hull of the two poses is grown with mitres, which is larger on tight turns.
         farthest = max(1.0 / abs(curvature) + shape.arm, shape.spike * shape.arm)
         grow = farthest * (1.0 - math.cos(0.5 * turn / steps))
     reach = 0.5 * (abs(length) + turn * shape.arm)  # of any point, from the pose half-way
@@ -186,9 +191,16 @@ def step_clear(
     b: float,
     grow: float,
 ) -> bool:
-    """Whether the hulls of two poses, (ax, ay) at yaw a and (bx, by) at b, overlap no square.
+    """Whether the hulls of the footprint at two poses overlap no blocked square.
 
-    `grow` is added on all sides.
+    Parameters
+    ----------
+    ground : Ground
+    shape : Shape
+    ax, ay, a, bx, by, b : float [cells; rad]
+        The two poses: position and yaw.
+    grow : float [cells]
+        Added to the hulls on all sides.
     """
     if len(shape.corners) == 0:
         need = max(shape.radius + grow, 2.0 * shape.touch)
@@ -210,14 +222,26 @@ def step_clear(
 
 @njit(cache=True, nogil=True)
 def within(clearance: Floats, x: float, y: float, margin: float) -> bool:
-    """Whether a point lies on the map, and no nearer to its border than `margin`."""
+    """Whether a point lies on the map, at least a margin away from its border.
+
+    Parameters
+    ----------
+    clearance : ndarray, shape (rows, cols) [cells]
+    x, y, margin : float [cells]
+    """
     rows, cols = clearance.shape
     return bool(margin <= x < cols - margin and margin <= y < rows - margin)
 
 
 @njit(cache=True, nogil=True)
 def nearness(clearance: Floats, x: float, y: float) -> tuple[float, float]:
-    """Return bounds of the clearance at a point, from that at the centre of its cell."""
+    """Return lower and upper bound of the clearance at a point, from that of its cell's centre.
+
+    Parameters
+    ----------
+    clearance : ndarray, shape (rows, cols) [cells]
+    x, y : float [cells]
+    """
     rows, cols = clearance.shape
     col, row = math.floor(x), math.floor(y)
     if row < 0 or col < 0 or row >= rows or col >= cols:
@@ -230,7 +254,17 @@ def nearness(clearance: Floats, x: float, y: float) -> tuple[float, float]:
 def discs_clear(
     clearance: Floats, discs: Floats, x: float, y: float, yaw: float, slack: float
 ) -> bool:
-    """Whether the discs that cover the footprint, `slack` larger, are clear at a pose."""
+    """Whether the discs that cover the footprint are certainly clear at a pose.
+
+    Parameters
+    ----------
+    clearance : ndarray, shape (rows, cols) [cells]
+    discs : ndarray, shape (k, 3) [cells, base_link]
+        x, y and radius.
+    x, y, yaw : float [cells; rad]
+    slack : float [cells]
+        Added to the radii.
+    """
     cosine, sine = math.cos(yaw), math.sin(yaw)
     for k in range(len(discs)):
         u, v, radius = discs[k, 0], discs[k, 1], discs[k, 2]

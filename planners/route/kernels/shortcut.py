@@ -14,7 +14,7 @@ from numba import njit
 from groundmap.arrays import Bools, Bytes, Floats, Ints, Ints32
 from planners.geometry.kernels.clearance import segment_clearance
 
-WORTH = 0.25  # [cells] a step that distances vouch for, if this long, saves an exact look
+WORTH = 0.25  # [cells] shortest step along which the distance field replaces the exact check
 
 
 @njit(cache=True, nogil=True)
@@ -23,9 +23,9 @@ def keeps(
 ) -> bool:
     """Whether the segment a-b keeps a distance to every blocked square, exactly.
 
-    A place is at most half a diagonal from its cell's centre, whose distance is known. That
-    refuses most segments at a glance, and allows steps as long as what is left; only where
-    little is left, pieces of a cell are looked at exactly.
+    A point is at most half a diagonal from the centre of its cell, whose distance is known. This
+    rejects most segments immediately and permits steps as long as the spare clearance. Only where
+    little clearance is spare are pieces of a cell checked exactly.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def keeps(
 
 @njit(cache=True, nogil=True)
 def leg_cost(factors: Floats | Bytes, ax: float, ay: float, bx: float, by: float) -> float:
-    """Return the length of the segment a-b, each part times the factor of the cell it is in.
+    """Return the length of the segment a-b, each part weighted by the factor of its cell.
 
     Parameters
     ----------
@@ -101,26 +101,26 @@ def best_chain(
 ) -> Ints:
     """Return the points of the cheapest chain of legs from the first to the last, in order.
 
-    A leg is allowed along a leg that was there before, and wherever it keeps its distance. Dynamic
-    programming: among all chains of allowed legs that skip fewer than `ahead` points, the best.
+    A new leg is allowed within an old leg, and where it keeps its distance. Dynamic programming
+    over all chains of allowed legs that span at most `ahead` points.
 
     Parameters
     ----------
     blocked, squared
         As for `keeps`.
     factors : ndarray, shape (rows, cols), or (0, 0)
-        What a metre costs, 1 or more; empty if all metres cost the same.
+        Cost per length, 1 or more; empty if it is uniform.
     points : ndarray, shape (n, 2) [cells]
     begins, ends : ndarray of int64, shape (n,)
-        The leg that goes on from each point, and the one that comes to it; of points within a leg,
-        the same.
+        The old leg that begins at each point and the one that ends there; the same for points
+        within a leg.
     need, wanted : float [cells]
-        Distance to keep; distance to keep where the legs that were there before kept it, and
-        otherwise at least what they kept.
+        Distance to keep always; distance to keep where the old legs kept it (elsewhere, at least
+        the distance of the old legs).
     price : float [cells]
-        What a leg costs beyond its length: fewer legs are worth that much.
+        Cost of a leg in addition to its length.
     ahead : int
-        Points that a leg may reach ahead.
+        Largest number of points that a leg spans.
     """
     n = len(points)
     kept = np.full(n, wanted)  # by the piece that leads to each point
@@ -179,7 +179,7 @@ def _clear(blocked: Bools, ax: float, ay: float, bx: float, by: float, need: flo
 
 @njit(cache=True, nogil=True)
 def _bounds(squared: Ints32, x: float, y: float) -> tuple[float, float]:
-    """Return the least and the greatest distance that a place may have to blocked squares."""
+    """Return bounds of the distance of a point to the nearest blocked square."""
     row = min(max(math.floor(y), 0), squared.shape[0] - 1)
     col = min(max(math.floor(x), 0), squared.shape[1] - 1)
     away = math.sqrt(squared[row, col]) / 2.0

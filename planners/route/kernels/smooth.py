@@ -1,4 +1,4 @@
-"""Bending a line under bounds: discs of free space around its points, and the relaxation in them.
+"""Smoothing a line: discs of free space around its points, and relaxation within them.
 
 Positions are in cells, as in `planners.geometry.kernels.clearance`: x grows with the column, and
 cell [row, col] is the closed square from (col, row) to (col + 1, row + 1).
@@ -13,22 +13,22 @@ from numba import njit
 
 from groundmap.arrays import Bools, Floats
 
-HALVINGS = 7  # a disc's centre is found up to 1/128 of how far it may move
-TENSION = 1e-3  # weight of the line's length, against being where its discs and bends allow
-STIFF = 10.0  # weight of its bends, likewise; it decides on how fast that converges, not on what to
-OVERSHOOT = 1.6  # steps this much longer than plain ones converge sooner
+HALVINGS = 7  # centres of discs are accurate to 1/128 of the distance that they may move
+TENSION = 1e-3  # weight of the line's length against the constraints
+STIFF = 10.0  # weight of the bends; it affects the rate of convergence, not the limit
+OVERSHOOT = 1.6  # over-relaxation factor
 
 
 @njit(cache=True, nogil=True)
 def nearest(blocked: Bools, x: float, y: float, limit: float) -> tuple[float, float, float]:
-    """Return the place of a blocked square that is nearest to (x, y), after its distance.
+    """Return the distance and position of the point of a blocked square nearest to (x, y).
 
     Parameters
     ----------
     blocked : ndarray of bool, shape (rows, cols)
     x, y : float [cells]
     limit : float [cells]
-        Squares that are no nearer don't count; without one, (x, y) itself is returned.
+        Farther squares are ignored; if there is no nearer one, (x, y) itself is returned.
 
     Returns
     -------
@@ -55,11 +55,11 @@ def nearest(blocked: Bools, x: float, y: float, limit: float) -> tuple[float, fl
 
 @njit(cache=True, nogil=True)
 def free_discs(blocked: Bools, points: Floats, need: float, most: float) -> Floats:
-    """Return a disc for each point in which the centre of a robot may be.
+    """Return for each point a disc in which the centre of a robot may be.
 
-    A disc around the point itself would pin it where there is no room to spare. So the centre
-    moves away from the nearest square for as long as the disc still holds the point; such discs
-    are nested, hence halving the interval finds the largest.
+    A disc around the point itself would fix it where no clearance is spare. Therefore the centre
+    moves away from the nearest square while the disc still contains the point. Such discs are
+    nested, so that bisection finds the largest one.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def free_discs(blocked: Bools, points: Floats, need: float, most: float) -> Floa
     need : float [cells]
         Distance to keep.
     most : float [cells]
-        How far centres may move.
+        Largest distance that centres move.
 
     Returns
     -------
@@ -99,24 +99,24 @@ def free_discs(blocked: Bools, points: Floats, need: float, most: float) -> Floa
 
 @njit(cache=True, nogil=True)
 def relax(points: Floats, discs: Floats, bend: float, low: int, high: int, rounds: int) -> Floats:
-    """Return the line that is bent no more than allowed, in its discs, and short, as nearly so.
+    """Return an approximation of the shortest line within its discs and its bound on bends.
 
-    Minimised is the sum of squared steps, with every second difference
-    ``p[i - 1] - 2 p[i] + p[i + 1]`` no longer than `bend` and every point in its disc: a convex
-    problem, solved by the alternating direction method of multipliers (Boyd et al. 2011). One
-    half of a round solves a banded linear system, the other cuts each second difference and each
-    place to its bound.
+    It minimises the sum of squared steps, where no second difference
+    ``p[i - 1] - 2 p[i] + p[i + 1]`` is longer than `bend` and every point is in its disc: a convex
+    problem, solved by the alternating direction method of multipliers (Boyd et al. 2011). The
+    first half of a round solves a banded linear system, the second projects each second
+    difference and each point onto its bound.
 
     Parameters
     ----------
     points : ndarray, shape (n, 2)
-        Equally spaced, or nearly so.
+        About equally spaced.
     discs : ndarray, shape (n, 3)
         x, y and radius.
     bend : float
-        For a curvature c at points a step s apart, c s².
+        c s² for a curvature c at points a distance s apart.
     low, high : int
-        Points before `low` and from `high` on stay as they are: one at either end, or more.
+        Points before `low` and from `high` on are fixed: at least one at either end.
     rounds : int
     """
     n = len(points)
@@ -150,7 +150,7 @@ def relax(points: Floats, discs: Floats, bend: float, low: int, high: int, round
 def _cut(
     values: Floats, i: int, cut: Floats, off: Floats, x: float, y: float, radius: float
 ) -> None:
-    """Cut a value to a disc, and add up by how much it was cut."""
+    """Project a value onto a disc, and accumulate the residual."""
     dx = OVERSHOOT * values[i, 0] + (1.0 - OVERSHOOT) * cut[i, 0] + off[i, 0] - x
     dy = OVERSHOOT * values[i, 1] + (1.0 - OVERSHOOT) * cut[i, 1] + off[i, 1] - y
     away = math.hypot(dx, dy)
@@ -183,7 +183,7 @@ def _bands(n: int) -> Floats:
 
 @njit(cache=True, nogil=True)
 def _factorise(bands: Floats, low: int, high: int) -> Floats:
-    """Return D and the two bands of L of the LDLᵀ of the rows of points that may move."""
+    """Return D and the two bands of L of the LDLᵀ decomposition for the movable points."""
     factors = np.zeros((len(bands), 3))
     for i in range(low, high):
         one = bands[i - 1, 1] if i - 1 >= low else 0.0
@@ -199,12 +199,12 @@ def _factorise(bands: Floats, low: int, high: int) -> Floats:
 
 @njit(cache=True, nogil=True)
 def _solve(bands: Floats, factors: Floats, right: Floats, x: Floats, low: int, high: int) -> None:
-    """Write the solution to the points of `x` that may move."""
+    """Write the solution to the movable points of `x`."""
     n = len(x)
     for c in range(2):
         for i in range(low, high):
             value = right[i, c]
-            for k in range(1, 3):  # points that are held
+            for k in range(1, 3):  # fixed points
                 if i - k >= 0 and i - k < low:
                     value -= bands[i - k, k] * x[i - k, c]
                 if i + k < n and i + k >= high:

@@ -11,62 +11,12 @@ import math
 import numpy as np
 from numba import njit
 
-from groundmap.arrays import Bools, Ints, Ints32
-from planners.costmap.kernels.distance import NOWHERE, envelope, squared_distances
+from groundmap.arrays import Ints32
+from planners.costmap.kernels.distance import NOWHERE
 
 NEAR = 0.2  # [voxels] room below which a line is checked exactly instead of stepped along
 PIECE = 1.0  # [voxels] longest piece of a line that is checked exactly
 HALVINGS = 64  # of a line, before its pieces are short: no float is that long
-
-
-@njit(cache=True, nogil=True)
-def all_squared_distances(blocked: Bools) -> Ints32:
-    """Return the squared distance of every voxel's centre to the nearest blocked cube.
-
-    Layer by layer as in the plane, then along the columns of layers, whose cubes begin
-    2 k - 1 half voxels away just as squares do.
-
-    Parameters
-    ----------
-    blocked : ndarray of bool, shape (layers, rows, cols)
-
-    Returns
-    -------
-    ndarray of int32, shape (layers, rows, cols) [(half voxels)²]
-        0 for what is blocked, and only for that; `NOWHERE` if nothing is.
-    """
-    layers, rows, cols = blocked.shape
-    squared = np.empty((layers, rows, cols), dtype=np.int32)
-    for layer in range(layers):
-        squared[layer] = squared_distances(blocked[layer], NOWHERE)
-    within = np.empty((cols, layers), dtype=np.int64)
-    room = layers + 1
-    border, at = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
-    starts = np.empty(room, dtype=np.int64)
-    for row in range(rows):
-        for layer in range(layers):
-            for col in range(cols):
-                within[col, layer] = squared[layer, row, col]
-        for col in range(cols):
-            _along(within[col], border, at, starts)
-        for layer in range(layers):
-            for col in range(cols):
-                squared[layer, row, col] = within[col, layer]
-    return squared
-
-
-@njit(cache=True, nogil=True)
-def _along(within: Ints, border: Ints, at: Ints, starts: Ints) -> None:
-    """Turn squared distances within layers into those over all layers."""
-    size, k = envelope(within, border, at, starts), 0
-    for layer in range(len(within)):
-        x = 2 * layer + 1
-        if size > 0:
-            while k + 1 < size and starts[k + 1] <= x:
-                k += 1
-            away = x - at[k]
-            within[layer] = min(within[layer], away * away + border[k])
-        within[layer] = min(within[layer], NOWHERE)
 
 
 @njit(cache=True, nogil=True)
@@ -91,7 +41,7 @@ def line_clear(
     Parameters
     ----------
     squared : ndarray of int32, shape (layers, rows, cols)
-        As of `all_squared_distances`.
+        As `MapSpace.all_squared`.
     size : float [m]
         Of a voxel.
     radius : float [m]
