@@ -1,7 +1,7 @@
 """The command ``groundmap``: exit 0 done, 1 a bound missed, 2 bad input or usage, 3 no route.
 
-130 and 143 after SIGINT (Ctrl-C) and SIGTERM: one line on stderr, at any time, and no process is
-left behind. What takes time to load is loaded after their handlers are set.
+SIGINT (Ctrl-C) and SIGTERM end it at any time with code 130 or 143, one line on stderr, and
+without leftover processes. Slow imports come after the signal handlers are set.
 """
 
 from __future__ import annotations
@@ -18,34 +18,34 @@ WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 
 
 class _Interrupts:
-    """What happens on SIGINT and SIGTERM.
+    """Handling of SIGINT and SIGTERM.
 
-    While a command runs, the first raises KeyboardInterrupt, so that files which are half written
-    are removed. Before and after, and at the second, the process ends at once.
+    While a command runs, the first signal raises KeyboardInterrupt, so that partly written files
+    are removed. Before and after a command, and at the second signal, the process ends at once.
     """
 
     def __init__(self) -> None:
         self.running = False
         self.received = 0  #: number of the signal; 0 for none
-        self._before: dict[int, Any] = {}
+        self._previous: dict[int, Any] = {}
 
     def set_handlers(self) -> None:
-        """Handle the signals, but for those that the caller wants ignored (as nohup does)."""
+        """Set handlers for the signals that the parent process does not ignore (as nohup does)."""
         if threading.current_thread() is not threading.main_thread():
             return
         for number in WORDS:
             if signal.getsignal(number) is not signal.SIG_IGN:
-                self._before[number] = signal.signal(number, self._handle)
+                self._previous[number] = signal.signal(number, self._handle)
         sys.unraisablehook = self._unraisable
 
     def restore_handlers(self) -> None:
-        """Have the signals handled as before."""
-        for number, handler in self._before.items():
+        """Restore the previous signal handlers."""
+        for number, handler in self._previous.items():
             signal.signal(number, handler)
         sys.unraisablehook = sys.__unraisablehook__
 
     def leave(self) -> None:
-        """End the process and those that it started, with a line on stderr."""
+        """End this process and its child processes, with one line on stderr."""
         if "multiprocessing" in sys.modules:
             for child in sys.modules["multiprocessing"].active_children():
                 child.kill()
@@ -60,7 +60,7 @@ class _Interrupts:
         raise KeyboardInterrupt
 
     def _unraisable(self, unraisable: Any) -> None:
-        """Leave where an interrupt is raised in what can't raise, such as a destructor."""
+        """End the process if an interrupt is raised in code that can't raise: a destructor."""
         if self.received and unraisable.exc_type is KeyboardInterrupt:
             self.leave()
         sys.__unraisablehook__(unraisable)
@@ -72,8 +72,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Parameters
     ----------
     arguments : sequence of str, optional
-        The process's own unless given. With arguments, the signals are handled as before once
-        the command has ended.
+        Default: those of the process. With arguments, the previous signal handlers are restored
+        when the command has ended.
     """
     interrupts = _Interrupts()
     interrupts.set_handlers()
@@ -96,6 +96,7 @@ def _run(interrupts: _Interrupts, argv: Sequence[str]) -> int:
         raise
     finally:
         interrupts.running = False
-        # Whatever came out of the command then: libraries turn interrupts into other exceptions.
+        # Also after other exceptions: some libraries replace KeyboardInterrupt by their own.
+
         if interrupts.received:
             interrupts.leave()

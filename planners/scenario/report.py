@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from groundmap.files.archive import write_atomically
 from planners.scenario.outcome import Figure, Outcome
-from planners.scenario.table import remarks, summary, verdict
+from planners.scenario.summary import remarks, summary, verdict
 
 TITLE = "Scenarios"
 MARKS = {True: "✓", False: "✗", None: "○"}  # verdicts, and whether bounds hold; not by colour alone

@@ -15,7 +15,7 @@ from PIL import Image
 from command_line import Ran, run
 from groundmap import ConfidenceGrid
 from planners import OWN_PLANNERS, max_curvature
-from planners.commands.console import patiently
+from planners.commands.console import show_waiting
 
 
 @pytest.fixture(scope="session")
@@ -159,11 +159,11 @@ def test_a_voxel_map_can_be_planned_on(tmp_path: Path) -> None:
     assert "planner: expected one that plans on 3-D maps: astar, auto" in ran.json["reason"]
 
 
-def test_what_takes_long_is_spoken_of(capsys: pytest.CaptureFixture[str]) -> None:
-    with patiently("counting stars", every=0.01):
+def test_a_long_wait_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
+    with show_waiting("counting stars", every=0.01):
         time.sleep(0.3)
     assert capsys.readouterr().err.startswith("counting stars ...\n")
-    with patiently("counting cows", every=60.0):
+    with show_waiting("counting cows", every=60.0):
         pass
     assert capsys.readouterr().err == ""
 

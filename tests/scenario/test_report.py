@@ -1,4 +1,4 @@
-"""The report and the table of outcomes, read as a browser and a person would."""
+"""The HTML report, parsed as a browser would."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from matplotlib.image import imread
 from groundmap.draw import figure_png
 from planners.scenario.outcome import Bound, Outcome
 from planners.scenario.report import Section, format_figure, write_report
-from planners.scenario.table import print_table
 
 VOID = {"meta", "img", "br"}
 PICTURE = figure_png(Figure(figsize=(1.0, 0.5)), dpi=20)
@@ -186,21 +185,3 @@ def test_a_folder_that_is_not_there_is_an_error(tmp_path: Path) -> None:
 )
 def test_numbers_have_four_digits(value: float | str | None, text: str) -> None:
     assert format_figure(value) == text
-
-
-def test_the_table_on_stdout_lines_up(capsys: pytest.CaptureFixture[str]) -> None:
-    print_table(OUTCOMES)
-    assert capsys.readouterr().out.splitlines() == [
-        "room                  passed      1.2 s",
-        "glass & <b>steel</b>  FAILED      2.0 s",
-        "    false_free: 0.25, expected ≤ 0.01",
-        "    clearance was not measured",
-        "drive                 skipped     0.0 s",
-        "    The log is not here.",
-        "1 passed, 1 failed, 1 skipped in 3.2 s",
-    ]
-
-
-def test_no_outcomes_print_their_count(capsys: pytest.CaptureFixture[str]) -> None:
-    print_table([])
-    assert capsys.readouterr().out == "0 passed, 0 failed, 0 skipped in 0.0 s\n"
