@@ -21,7 +21,7 @@ from planners.commands.console import JsonOption, emit, format_table, show_progr
 from planners.errors import PlanningError
 from planners.scenario.case import find_scenarios, load_scenario
 from planners.scenario.outcome import Outcome
-from planners.scenario.recall_section import why_one_triangulates
+from planners.scenario.recall_section import triangulation_section
 from planners.scenario.report import write_report
 from planners.scenario.run import run_scenario
 from planners.scenario.summary import reasons, remarks, summary, verdict
@@ -63,7 +63,7 @@ def run_command(
     by_path = dict(show_progress(_run(paths, jobs), total=len(paths), what="running scenarios"))
     outcomes = [by_path[path] for path in paths]
     if report is not None:
-        write_report(report, outcomes, sections=[why_one_triangulates()])
+        write_report(report, outcomes, sections=[triangulation_section()])
     if as_json:
         _emit_outcomes(outcomes)
     else:

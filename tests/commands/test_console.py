@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 from rich.cells import cell_len
 
@@ -50,7 +52,7 @@ def test_long_lists_are_left_out_of_the_table(capsys: Captured) -> None:
 
 
 def test_rows_are_aligned_and_not_wrapped_on_a_narrow_console(capsys: Captured) -> None:
-    rows = {
+    rows: dict[str, dict[str, Any]] = {
         "hybrid_astar": {"length": 24.91, "min_clearance": 0.4034, "cost": None},
         "jps": {"length": 1234.5, "min_clearance": 0.381, "cost": 24},
     }
