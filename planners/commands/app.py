@@ -13,7 +13,7 @@ from typer.exceptions import TyperException
 from groundmap.errors import GroundmapError
 from groundmap.printable import printable
 from planners.commands.bench import bench_app
-from planners.commands.console import say
+from planners.commands.console import print_message
 from planners.commands.convert import convert_command
 from planners.commands.demo import demo_command
 from planners.commands.evaluate import evaluate_command
@@ -91,7 +91,7 @@ def run(argv: Sequence[str]) -> int:
 def _report(error: Exception, reason: str, code: int, argv: Sequence[str]) -> int:
     """Print the reason on stderr, with ``--json`` also as JSON on stdout; return the code."""
     reason = printable(reason, lines=True)
-    say(f"groundmap: {reason}")
+    print_message(f"groundmap: {reason}")
     if "--json" in argv:
         print(json.dumps({"error": type(error).__name__, "reason": reason}))
     return code

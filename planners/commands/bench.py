@@ -13,7 +13,7 @@ from planners.bench.benchmark_runner import ANY_ANGLE, figures
 from planners.bench.movingai import WorkloadResult, find_workloads, run
 from planners.commands.bench_motions import motions_command
 from planners.commands.bench_samplers import SamplerOptions, compare_samplers
-from planners.commands.console import JsonOption, emit, emit_rows, say, show_progress
+from planners.commands.console import JsonOption, emit, emit_rows, print_message, show_progress
 
 MISMATCH = 1  # exit code
 COLUMNS = ("queries", "solved", "mismatches", "median_ms", "p95_ms", "setup_ms")
@@ -228,6 +228,6 @@ def _report_mismatches(results: list[WorkloadResult]) -> None:
     for scen, (query, length, _, _) in mismatches[:SHOWN]:
         expected = f"a length of {query.length:g}" if query.solvable else "no route"
         got = "no route" if length is None else f"{length:g}"
-        say(f"{scen}:{query.line}: expected {expected}, got {got}")
+        print_message(f"{scen}:{query.line}: expected {expected}, got {got}")
     if len(mismatches) > SHOWN:
-        say(f"... and {len(mismatches) - SHOWN} more")
+        print_message(f"... and {len(mismatches) - SHOWN} more")

@@ -70,7 +70,7 @@ def format_table(table: Table) -> list[str]:
     return [line.rstrip() for line in captured.get().splitlines()]
 
 
-def say(message: str) -> None:
+def print_message(message: str) -> None:
     """Print a message on stderr."""
     print(printable(message, lines=True), file=sys.stderr)
 
@@ -85,7 +85,7 @@ def show_progress(items: Iterable[T], *, total: int, what: str) -> Iterator[T]:
     for number, item in enumerate(items, start=1):
         yield item
         if time.monotonic() - printed > PROGRESS_INTERVAL:
-            say(f"{what}: {number} of {total}")
+            print_message(f"{what}: {number} of {total}")
             printed = time.monotonic()
 
 
@@ -96,7 +96,7 @@ def show_waiting(what: str, *, every: float = PROGRESS_INTERVAL) -> Iterator[Non
 
     def remind() -> None:
         while not over.wait(every):
-            say(f"{what} ...")
+            print_message(f"{what} ...")
 
     reminder = threading.Thread(target=remind, daemon=True)
     reminder.start()

@@ -16,7 +16,13 @@ from groundmap.mapper import warm_up
 from groundmap.stopwatch import Stopwatch
 from groundmap.view.diagnosis import SAMPLE, describe_dropped, likely_mistakes
 from groundmap.view.jumps import Jump
-from planners.commands.console import JsonOption, emit, say, seconds_since_start, show_progress
+from planners.commands.console import (
+    JsonOption,
+    emit,
+    print_message,
+    seconds_since_start,
+    show_progress,
+)
 from planners.commands.settings_file import ConfigOption, read_settings
 
 SHOWN_JUMPS = 5  # jumps of the poses, one warning each
@@ -80,7 +86,7 @@ def map_command(
     sample, jumps = _integrate(mapper, show_progress(timed, total=total, what="mapping views"))
     warnings = _warnings(mapper, sample) + _jump_warnings(jumps)
     for warning in warnings:
-        say(f"warning: {warning}")
+        print_message(f"warning: {warning}")
     with stopwatch.measure("save"):
         mapper.grid.save(out)
     summary = _summary(mapper, jumps, stopwatch, out) | {"warnings": warnings}
