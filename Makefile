@@ -30,25 +30,25 @@ $(READY): $(INSTALLED)
 	$(BIN)/python -m pip install --quiet --editable '.[dev]'
 	@touch $@
 
-demo: $(INSTALLED) ## Map a recorded courtyard and plan through it; writes groundmap-demo/
+demo: $(INSTALLED) ## Map the bundled sample log and plan a route; writes groundmap-demo/
 	$(BIN)/groundmap demo
 
 test: $(READY) ## Run the tests and the doctests
 	$(BIN)/pytest -n $(WORKERS)
 
-check: $(READY) ## Check format, lint, types, import contracts
+check: $(READY) ## Check format, lint, types and import contracts
 	$(BIN)/ruff format --check
 	$(BIN)/ruff check
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
 
-crash-matrix: $(READY) ## Plan at random in processes that may crash (ATTEMPTS=2000 SEED=7)
+crash-matrix: $(READY) ## Plan random problems in processes that can crash (ATTEMPTS=2000 SEED=7)
 	$(BIN)/python tools/crash_matrix.py --attempts $(ATTEMPTS) $(if $(SEED),--seed $(SEED))
 
-size: $(READY) ## Print lines per module, longest functions, public names, layers
+size: $(READY) ## Print lines per room and module, public names, longest functions
 	@$(BIN)/python tools/size.py
 
-fuzz: $(READY) ## Fuzz readers and API (FILES, CALLS, SECONDS, SEED), then seek new examples
+fuzz: $(READY) ## Fuzz readers and API (FILES, CALLS, SECONDS, SEED), then draw new examples
 	cd tests && PYTHONPATH=. '$(CURDIR)/$(BIN)/python' -m fuzz --files $(FILES) --calls $(CALLS) --seconds $(SECONDS) $(addprefix --seed ,$(SEED)) --keep '$(CURDIR)/fuzz-failures'
 	$(BIN)/pytest -n $(WORKERS) -m hypothesis --hypothesis-profile=explore
 
@@ -62,12 +62,12 @@ docs: $(READY) ## Build the documentation in docs/_build/html; warnings are erro
 release: $(READY) ## Set the version, date the changelog, commit and tag: make release VERSION=0.2.0
 	$(BIN)/python tools/release.py $(VERSION)
 
-wheel-test: $(READY) ## Build the wheel, install it alone, run the tests against it
+wheel-test: $(READY) ## Build the wheel, install it without the sources, run the tests against it
 	rm -rf dist
 	$(BIN)/python -m build --wheel --no-isolation --outdir dist
 	$(BIN)/python tools/install_wheel.py dist $(WHEEL_VENV)
 	cd $(WHEEL_VENV) && bin/pytest -n $(WORKERS) -c '$(CURDIR)/pyproject.toml' --installed '$(CURDIR)/tests' '$(CURDIR)/scenarios' --pyargs groundmap planners
 
-clean: ## Remove everything that the other targets made
+clean: ## Remove everything that the other targets created
 	rm -rf .venv $(WHEEL_VENV) dist groundmap-demo fuzz-failures docs/_build docs/api .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find groundmap planners tests tools -name __pycache__ -type d -prune -exec rm -rf {} +

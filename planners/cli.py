@@ -1,7 +1,7 @@
 """The command ``groundmap``: exit 0 done, 1 a bound missed, 2 bad input or usage, 3 no route.
 
-The exit code is 130 after SIGINT (Ctrl-C) and 143 after SIGTERM, with one line on stderr, at any
-time, and no child process is left running. Slow imports are made after their handlers are set.
+SIGINT (Ctrl-C) and SIGTERM end it at any time with code 130 or 143, one line on stderr, and
+without leftover processes. Slow imports come after the signal handlers are set.
 """
 
 from __future__ import annotations
@@ -18,34 +18,34 @@ WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 
 
 class _Interrupts:
-    """Handlers of SIGINT and SIGTERM.
+    """Handling of SIGINT and SIGTERM.
 
-    While a command runs, the first signal raises KeyboardInterrupt, so that incomplete files are
-    removed. The second signal, and any signal before or after the command, ends the process.
+    While a command runs, the first signal raises KeyboardInterrupt, so that partly written files
+    are removed. Before and after a command, and at the second signal, the process ends at once.
     """
 
     def __init__(self) -> None:
         self.running = False
         self.received = 0  #: number of the signal; 0 for none
-        self._before: dict[int, Any] = {}
+        self._previous: dict[int, Any] = {}
 
     def set_handlers(self) -> None:
-        """Handle the signals, except those that the parent process ignores (such as nohup)."""
+        """Set handlers for the signals that the parent process does not ignore (as nohup does)."""
         if threading.current_thread() is not threading.main_thread():
             return
         for number in WORDS:
             if signal.getsignal(number) is not signal.SIG_IGN:
-                self._before[number] = signal.signal(number, self._handle)
+                self._previous[number] = signal.signal(number, self._handle)
         sys.unraisablehook = self._unraisable
 
     def restore_handlers(self) -> None:
-        """Restore the previous handlers."""
-        for number, handler in self._before.items():
+        """Restore the previous signal handlers."""
+        for number, handler in self._previous.items():
             signal.signal(number, handler)
         sys.unraisablehook = sys.__unraisablehook__
 
     def leave(self) -> None:
-        """End the process and its child processes, with a line on stderr."""
+        """End this process and its child processes, with one line on stderr."""
         if "multiprocessing" in sys.modules:
             for child in sys.modules["multiprocessing"].active_children():
                 child.kill()
@@ -60,7 +60,7 @@ class _Interrupts:
         raise KeyboardInterrupt
 
     def _unraisable(self, unraisable: Any) -> None:
-        """End the process if an interrupt occurs where it can't be raised, as in a destructor."""
+        """End the process if an interrupt is raised in code that can't raise: a destructor."""
         if self.received and unraisable.exc_type is KeyboardInterrupt:
             self.leave()
         sys.__unraisablehook__(unraisable)
@@ -73,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     ----------
     arguments : sequence of str, optional
         Default: those of the process. With arguments, the previous signal handlers are restored
-        after the command.
+        when the command has ended.
     """
     interrupts = _Interrupts()
     interrupts.set_handlers()
@@ -96,6 +96,7 @@ def _run(interrupts: _Interrupts, argv: Sequence[str]) -> int:
         raise
     finally:
         interrupts.running = False
-        # Also after other exceptions, as libraries convert interrupts to them.
+        # Also after other exceptions: some libraries replace KeyboardInterrupt by their own.
+
         if interrupts.received:
             interrupts.leave()

@@ -224,8 +224,8 @@ def test_plan_says_why_there_is_no_route(
     ("options", "sentence"),
     [
         (("--start", "nan,3"), "start: expected x, y [m] and optionally yaw [rad], all finite"),
-        (("--goal", "3"), "expected 2 or 3 numbers with commas between, got '3'"),
-        (("--goal", "here"), "expected 2 or 3 numbers with commas between, got 'here'"),
+        (("--goal", "3"), "expected 2 or 3 numbers separated by commas, got '3'"),
+        (("--goal", "here"), "expected 2 or 3 numbers separated by commas, got 'here'"),
         (("--footprint", "-1"), "footprint: expected a radius of 0 or more [m], or"),
         (("--footprint", "nan"), "footprint: expected a radius of 0 or more [m], or"),
         (("--footprint", "wide"), "--footprint"),
@@ -235,7 +235,7 @@ def test_plan_says_why_there_is_no_route(
         (("--speed", "3"), "No such option: --speed"),
         (("--out", "route.txt"), "path: expected a name that ends in .geojson, .json, .csv, .yaml"),
         (("--footprint", "0,0 1,1"), "footprint: expected a radius of 0 or more [m], or 3 or more"),
-        (("--footprint", "0,0 1,1 1"), "expected 2 numbers with commas between, got '1'"),
+        (("--footprint", "0,0 1,1 1"), "expected 2 numbers separated by commas, got '1'"),
         (("--set", "weight"), "expected NAME=VALUE, each name once, got 'weight'"),
         (("--set", "weight=3"), "weight: expected a setting of AStarSettings"),
         (("--clearance-weight", "-1"), "clearance_weight: expected greater than or equal to 0"),
@@ -370,7 +370,7 @@ def test_without_arguments_it_prints_help() -> None:
     [
         ("demo", ()),
         ("map", ("cell [m]", "features [m]", "ground [m]")),
-        ("plan", ("Start [m, rad; map]", "Goal, likewise", "robot [m]", "after [s]")),
+        ("plan", ("Start [m, rad; map]", "Goal [m, rad; map]", "robot [m]", "planning [s]")),
         ("plot", ("draw [m]", "route [m]")),
         ("info", ("areas [m²]", "bounds [m]")),
         ("convert", ()),

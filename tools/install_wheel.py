@@ -1,4 +1,4 @@
-"""Check the one wheel in a folder and install it, with the test tools, in a venv of its own."""
+"""Check the wheel in a folder, and install it with the test tools in a separate venv."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PYPROJECT = Path(__file__).parent.parent / "pyproject.toml"
 
 
 def main(folder: Path, environment: Path) -> None:
-    """Install the wheel of `folder` in `environment`, unless that is what is there."""
+    """Install the wheel of `folder` in `environment`, unless it is installed already."""
     (wheel,) = folder.glob("*.whl")
     check_top_level(wheel)
     third_party, content = digest(PYPROJECT), digest(wheel)
@@ -35,18 +35,18 @@ def main(folder: Path, environment: Path) -> None:
 
 
 def check_top_level(wheel: Path) -> None:
-    """Exit unless the wheel holds our two packages and its metadata, and nothing else."""
+    """Exit unless the wheel contains the two packages, its metadata, and nothing else."""
     project = tomllib.loads(PYPROJECT.read_text())["project"]
     expected = {"groundmap", "planners", f"{project['name']}-{project['version']}.dist-info"}
     with zipfile.ZipFile(wheel) as archive:
-        found = {name.partition("/")[0] for name in archive.namelist()}
-    if found != expected:
-        sys.exit(f"{wheel.name}: expected {sorted(expected)} at the top, got {sorted(found)}")
-    print(f"{wheel.name} holds {', '.join(sorted(found))}")
+        names = {name.partition("/")[0] for name in archive.namelist()}
+    if names != expected:
+        sys.exit(f"{wheel.name}: expected {sorted(expected)} at the top, got {sorted(names)}")
+    print(f"{wheel.name} contains {', '.join(sorted(names))}")
 
 
 def replace_package(environment: Path, wheel: Path) -> None:
-    """Install the wheel over an older one, without what compiled code that one left behind."""
+    """Replace an older wheel, and remove the compiled code that it left behind."""
     pip(environment, "uninstall", "--yes", "groundmap")
     for package in ("groundmap", "planners"):
         for remains in environment.glob(f"lib/python*/site-packages/{package}"):

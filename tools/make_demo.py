@@ -1,8 +1,8 @@
-"""Make the log that `groundmap demo` maps: what a robot with a stereo camera saw of a courtyard.
+"""Make the log that `groundmap demo` maps: a simulated drive of a stereo camera in a courtyard.
 
-`groundmap.simulate` does the seeing; here are the courtyard, the drive and the rig. The same seed
-makes the same log; `python tools/make_demo.py` writes it to planners/demo_data, where the command
-finds it.
+This file defines the courtyard, the drive and the rig; `groundmap.simulate` computes the views. The
+same seed gives the same log. `python tools/make_demo.py` writes it to planners/demo_data, from
+where the command reads it.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ SEED = 20
 DIGITS = 2  # of a pixel, after the point
 
 DOOR = ((14.0, 9.0), (14.0, 10.4))  # [m, map], from jamb to jamb
-# Opposite corners x0, y0, x1, y1 and the height of what stands in the courtyard [m, map].
+# Opposite corners x0, y0, x1, y1 and the height of each obstacle in the courtyard [m, map].
 WALLS = (
     (-0.2, -0.2, 24.2, 0.0, 2.5),  # south
     (-0.2, 16.0, 24.2, 16.2, 2.5),  # north
     (-0.2, 0.0, 0.0, 16.0, 2.5),  # west
     (24.0, 0.0, 24.2, 16.0, 2.5),  # east
     (13.9, 0.0, 14.1, 9.0, 2.5),  # between the two halves, up to the doorway
-    (13.9, 10.4, 14.1, 16.0, 2.5),  # and on from it
+    (13.9, 10.4, 14.1, 16.0, 2.5),  # from the doorway on
 )
 PARKED = (
     (6.5, 4.6, 10.5, 6.4, 1.4),  # a car
@@ -67,7 +67,7 @@ COURTYARD = World(
         Solid(shapely.box(*corners), top=height) for *corners, height in WALLS + PARKED + POLES
     ),
 )
-# Where the robot went; x, y [m] and yaw [deg].
+# Path of the robot; x, y [m] and yaw [deg].
 DRIVE = DriveSettings(
     stops=(
         (3.0, 3.4, 180), (3.0, 3.4, 270), (3.0, 3.4, 0), (6.0, 2.6, -15), (9.4, 2.8, -20),
@@ -99,7 +99,7 @@ SENSOR = SensorSettings(
 
 
 def moves() -> Drive:
-    """Return the drive, which the log has as it was."""
+    """Return the drive; the logged poses have no noise."""
     return drive(DRIVE, np.random.default_rng(SEED))
 
 
@@ -112,7 +112,7 @@ def views() -> list[View]:
 def tables(log: Iterable[View]) -> dict[Kind, npt.NDArray[np.float32]]:
     """Return the rows of both tables: view, id, and (uL, uR, v) of each end, rounded [px].
 
-    Half as many columns as XYZ and covariance would take, and digits that compress well.
+    This is half as many columns as for XYZ and covariance, and the digits compress well.
     """
     rows: dict[Kind, list[Floats]] = {"points": [], "segments": []}
     for number, view in enumerate(log):
@@ -125,7 +125,7 @@ def tables(log: Iterable[View]) -> dict[Kind, npt.NDArray[np.float32]]:
 
 
 def pixels_of(rig: StereoRig, xyz: Floats) -> Floats:
-    """Return the matched pixels (uL, uR, v) of triangulated places, shape (..., 3) [camera]."""
+    """Return the matched pixels (uL, uR, v) of points, shape (..., 3) [m, camera]."""
     x, y, depth = np.moveaxis(xyz, -1, 0)
     left = rig.cx + rig.fx * x / depth
     right = left - rig.fx * rig.baseline / depth

@@ -1,6 +1,6 @@
-"""Draw the pictures of README.md: from features to a route in four steps; routes of all planners.
+"""Draw the pictures of README.md: the four steps from features to a route; routes of all planners.
 
-`python tools/make_picture.py` maps the log that `groundmap demo` maps.
+`python tools/make_picture.py` uses the log of `groundmap demo`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from planners import OWN_PLANNERS, PlanningProblem, plan
 from planners.commands.demo import FOOTPRINT, GOAL
 
 ROOT = Path(__file__).parent.parent
-VIEW = 47  # it sees far
+VIEW = 47  # with distant features
 VIEW_BOUNDS = (-0.5, -7.0, 13.5, 7.0)  # [m, view]
 MAP_BOUNDS = (-1.0, -1.0, 25.0, 17.0)  # [m, map]
 
@@ -46,7 +46,7 @@ def main() -> None:
     draw_triangulation(parts, ax=axes[1])
     for ax in axes[2:]:
         for scale in draw_grid(mapper.grid, bounds=MAP_BOUNDS, ax=ax)[1:3]:
-            scale.remove()  # it would lie on a wall
+            scale.remove()  # it would cover a wall
         ax.get_legend().remove()
     draw_trajectory(mapper.grid.trajectory, ax=axes[2])
     axes[2].get_legend().remove()
@@ -68,20 +68,20 @@ def main() -> None:
 
 
 def draw_planners(grid: ConfidenceGrid) -> None:
-    """Draw what every planner makes of the way through the courtyard's doorway."""
+    """Draw the route of every planner through the courtyard's doorway."""
     start = grid.trajectory[0]
     problem = PlanningProblem(grid, start=start, goal=(*GOAL, 0.0), footprint=FOOTPRINT)
     routes = {name: plan(problem, name).waypoints for name in sorted(OWN_PLANNERS)}
     figure, ax = new_figure(MAP_BOUNDS)
     draw_grid(grid, bounds=MAP_BOUNDS, ax=ax)
     if (legend := ax.get_legend()) is not None:
-        legend.remove()  # the colours of the states are told apart in the picture above
+        legend.remove()  # the other picture has a legend of these colours
     draw_routes(routes, ax=ax)
     save_figure(figure, ROOT / "docs" / "planners.png", dpi=80)
 
 
 def frame(ax: Axes, title: str) -> None:
-    """Give a panel its title and take the rest away."""
+    """Set the title of a panel, and remove ticks and labels."""
     ax.set_title("")
     ax.set_title(title, fontsize=11, loc="left")
     ax.set(xticks=[], yticks=[], xlabel="", ylabel="", aspect="equal")

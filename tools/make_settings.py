@@ -1,6 +1,6 @@
-"""Write docs/settings.md: what every planner can be told, as its settings class has it.
+"""Write docs/settings.md: the settings of every planner, from its settings class.
 
-Run it when a setting changes, from the root of the tree.
+Run it from the root of the tree when a setting has changed.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ FILE = Path(__file__).parents[1] / "docs" / "settings.md"
 HEAD = """# Settings of planners
 
 `planners.plan(problem, "NAME", setting=value)`, or `groundmap plan --planner NAME --set
-setting=value`. Every planner takes `time_limit`, the time [s] from the call to the answer, 30
-unless told, none for no limit; a number beyond its range is refused.
+setting=value`. Every planner has the setting `time_limit`: the time from the call to the answer
+[s]; default: 30 s, `none` for no limit. A number out of its range is an error.
 """
 SAMPLING = """
 ## Sampling planners
 
-All of them take these:
+All sampling planners have these settings:
 """
 OWN = """
-These are parameters of single planners, under the names that OMPL has; where none is given, OMPL's
-own value counts, but for `range`, which is then fitted to the map.
+These are OMPL's parameters of single planners, with OMPL's names. The default is OMPL's own value,
+except for `range`, whose default depends on the map.
 """
 
 
 def document() -> str:
-    """Return what the file is to hold."""
+    """Return the text of the file."""
     parts = [HEAD]
     for name, entry in sorted(OWN_PLANNERS.items()):
         if fields := own_fields(entry.settings):
@@ -47,43 +47,44 @@ def document() -> str:
 
 
 def own_fields(settings: type[SearchSettings]) -> dict[str, FieldInfo]:
-    """Return the settings of a planner beside those that all of them have."""
+    """Return the settings of a planner without those that all planners have."""
     common = SearchSettings.model_fields
     return {key: field for key, field in settings.model_fields.items() if key not in common}
 
 
 def takers(name: str) -> str:
-    """Return the planners that have a parameter."""
-    names = [one for one in sorted(samplers()) if refusal(one, "r2") is None]
-    return ", ".join(f"`{one}`" for one in names if has_parameter(one, name))
+    """Return the names of the planners that have a parameter."""
+    planners = [planner for planner in sorted(samplers()) if refusal(planner, "r2") is None]
+    return ", ".join(f"`{planner}`" for planner in planners if has_parameter(planner, name))
 
 
 def table(fields: dict[str, FieldInfo], planners_of: Any = None) -> str:
     """Return a table of settings."""
-    heads = ["setting", "default", "range", "what it is", *(["planners"] if planners_of else [])]
+    heads = ["setting", "default", "range", "meaning", *(["planners"] if planners_of else [])]
     lines = ["", "| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
     for name, field in fields.items():
-        cells = [f"`{name}`", shown(field.default), span(field), field.description or ""]
+        default, limits = format_default(field.default), format_range(field)
+        cells = [f"`{name}`", default, limits, field.description or ""]
         cells += [planners_of(name)] if planners_of else []
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join([*lines, ""])
 
 
-def shown(value: Any) -> str:
-    """Return a default as one would write it."""
+def format_default(value: Any) -> str:
+    """Return a default as code; empty for None."""
     return "" if value is None or value == () else f"`{value}`"
 
 
-def span(field: FieldInfo) -> str:
-    """Return the range of a number, or the values there are."""
+def format_range(field: FieldInfo) -> str:
+    """Return the range of a number."""
     limits = {"ge": "≥ {:g}", "gt": "> {:g}", "le": "≤ {:g}", "lt": "< {:g}"}
-    found = [
+    texts = [
         text.format(getattr(rule, kind))
         for rule in field.metadata
         for kind, text in limits.items()
         if getattr(rule, kind, None) is not None
     ]
-    return ", ".join(found)
+    return ", ".join(texts)
 
 
 if __name__ == "__main__":

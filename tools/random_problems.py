@@ -1,4 +1,4 @@
-"""Planning problems and planner settings drawn at random, for tools/crash_matrix.py."""
+"""Random planning problems and planner settings for tools/crash_matrix.py."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ LIMITS = (0.0, 0.01, 0.03, 0.1)  # [s]
 CAR = np.array([(-0.5, -0.45), (1.5, -0.45), (1.5, 0.45), (-0.5, 0.45)])
 ELL = np.array([(-0.4, -0.4), (1.2, -0.4), (1.2, 0.0), (0.0, 0.0), (0.0, 0.8), (-0.4, 0.8)])
 UNKNOWN, CONTESTED = 0.0, 0.005  # confidence
-UNIFORM = ("jps", "jps+", "lazy_theta", "polyanya", "theta")  # they need cells of one cost
+UNIFORM = ("jps", "jps+", "lazy_theta", "polyanya", "theta")  # they need uniform costs
 WEIGHING = (HEEDING | OWN_PLANNERS.keys()) - set(UNIFORM)  # planners that take costs into account
 
 
 class Attempt(NamedTuple):
-    """A problem, and what the planner is asked."""
+    """A problem, a planner and its settings."""
 
     problem: PlanningProblem
     planner: str
@@ -38,20 +38,20 @@ class Attempt(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """What is drawn from."""
+    """Planners and spaces to draw from."""
 
     planners: tuple[str, ...]
     spaces: tuple[StateSpace, ...] = get_args(StateSpace)
-    refused: bool = False  #: whether combinations are tried that are refused otherwise
+    refused: bool = False  #: whether refused combinations are drawn, too
 
 
 def all_planners() -> tuple[str, ...]:
-    """Return the names of all planners, those of OMPL included."""
+    """Return the names of all planners, including OMPL's."""
     return (*sorted(OWN_PLANNERS), *sorted(samplers()))
 
 
 def draw(choice: Choice, seed: int, number: int) -> Attempt:
-    """Return one attempt: the same for the same seed and number."""
+    """Return an attempt; it depends only on seed and number."""
     rng = np.random.default_rng([seed, number])
     planner = str(rng.choice(choice.planners))
     space: StateSpace | None = None
@@ -102,7 +102,7 @@ def draw(choice: Choice, seed: int, number: int) -> Attempt:
 
 
 def _field(rng: np.random.Generator, axes: int) -> Floats32:
-    """Return evidence: random cells, rooms, or a field, with unknown and contested parts."""
+    """Return evidence: random cells, walls, boxes or open space, partly unknown and contested."""
     low, high = SIDES if axes == 2 else (4, 14)
     if axes == 2 and rng.random() < 0.01:
         low, high = LARGE
@@ -124,7 +124,7 @@ def _field(rng: np.random.Generator, axes: int) -> Floats32:
 
 
 def _add_walls(rng: np.random.Generator, field: Floats32) -> None:
-    """Cross the map with walls, each with a door."""
+    """Add walls across the map, each with a door."""
     for axis, length in enumerate(field.shape):
         for _ in range(rng.integers(1, 3)):
             wall: list[Any] = [slice(None)] * field.ndim
@@ -142,9 +142,9 @@ def _box(rng: np.random.Generator, shape: tuple[int, ...]) -> tuple[slice, ...]:
 
 
 def _places(rng: np.random.Generator, free: Bools, radius: float) -> Bools:
-    """Return cells for starts and goals: clear ones, more often than not."""
-    away = ndimage.distance_transform_edt(np.pad(free, 1))[(slice(1, -1),) * free.ndim] - 0.5
-    for places in (away >= 1.5 * radius, free):
+    """Return cells for starts and goals: mostly those with clearance."""
+    distance = ndimage.distance_transform_edt(np.pad(free, 1))[(slice(1, -1),) * free.ndim] - 0.5
+    for places in (distance >= 1.5 * radius, free):
         if places.any() and rng.random() < 0.9:
             return np.asarray(places)
     return np.ones_like(free)
@@ -153,7 +153,7 @@ def _places(rng: np.random.Generator, free: Bools, radius: float) -> Bools:
 def _pose(
     rng: np.random.Generator, places: Bools, size: float, origin: Floats
 ) -> tuple[float, ...]:
-    """Return a place in one of some cells, and a yaw on 2-D maps [map]."""
+    """Return a position in one of the cells, and a yaw on 2-D maps [map]."""
     cells = np.argwhere(places)
     cell = cells[rng.integers(len(cells))][::-1]
     within = 0.5 if rng.random() < 0.5 else rng.random(len(cell))
@@ -165,7 +165,7 @@ def _pose(
 
 
 def _near(rng: np.random.Generator, pose: tuple[float, ...], size: float) -> tuple[float, ...]:
-    """Return the pose itself, or one that hardly differs."""
+    """Return the same pose, or one that is slightly different."""
     shift = float(rng.choice([0.0, 1e-9, 0.01])) * size
     turn = float(rng.choice([0.0, 1e-9, math.pi]))
     return (pose[0] + shift, *pose[1:-1], pose[-1] + (turn if len(pose) == 3 else 0.0))
@@ -183,7 +183,7 @@ def _costs(rng: np.random.Generator, size: float) -> CostSettings:
 
 
 def _turning_radius(rng: np.random.Generator, size: float) -> float:
-    """Return one that suits the map, mostly, or one at the ends of what is allowed [m]."""
+    """Return a radius that suits the map, or sometimes an end of the valid range [m]."""
     if rng.random() < 0.1:
         return float(rng.choice([0.01, 1000.0]))
     return float(np.clip(size * rng.uniform(0.5, 8.0), 0.01, 1000.0))
@@ -230,7 +230,7 @@ def _sampling(
 
 
 def ends_of(name: str) -> list[Any]:
-    """Return the least and the greatest value of a planner's parameter, and one in between."""
+    """Return the least and the greatest value of a parameter, and one in between."""
     field = SamplingSettings.model_fields[name]
     bounds = {
         key: getattr(rule, key)

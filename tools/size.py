@@ -1,4 +1,4 @@
-"""Print how large the code is: rooms with their purpose, modules with layer, lines and names."""
+"""Print the size of the code: rooms with purpose, modules with layer, lines and public names."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from statistics import median
 from typing import NamedTuple
 
 ROOT = Path(__file__).parent.parent
-LARGE = 300  # [lines], from here on a module is flagged
-LONGEST = 10  # functions listed at the end
+LARGE = 300  # lines; longer modules are flagged
+LONGEST = 10  # number of functions listed at the end
 Function = tuple[int, str]  # lines, name
 
 
 class Module(NamedTuple):
-    """What is counted in one file."""
+    """Sizes of one file."""
 
     name: str
     layer: int
@@ -33,7 +33,7 @@ class Room(NamedTuple):
 
 
 def main() -> None:
-    """Print one table per room, the sums, and the longest functions."""
+    """Print one table per room, totals, and the longest functions."""
     rooms = [room for package in ("groundmap", "planners") for room in measure(package)]
     for room in rooms:
         print_room(room)
@@ -53,7 +53,7 @@ def main() -> None:
 
 
 def print_room(room: Room) -> None:
-    """Print a room's line, and a table of its modules."""
+    """Print the total of a room, and a table of its modules."""
     total = sum(module.lines for module in room.modules)
     print(f"{room.name}  {len(room.modules)} modules, {total} lines. {room.purpose}")
     for module in sorted(room.modules, key=lambda module: (-module.layer, module.name)):
@@ -69,7 +69,7 @@ def print_room(room: Room) -> None:
 
 
 def measure(package: str) -> list[Room]:
-    """Measure a package room by room; an __init__, which only hands on names, is no module."""
+    """Return the rooms of a package; files whose name begins with an underscore do not count."""
     layers = layers_by_module()
     rooms = []
     for init in sorted((ROOT / package).rglob("__init__.py")):
@@ -96,9 +96,9 @@ def measure_module(path: Path, room: str, layers: dict[str, int]) -> Module:
 
 
 def layers_by_module() -> dict[str, int]:
-    """Return the layer of each module in its room, 1 the lowest, as the import contracts have it.
+    """Return the layer of each module in the import contract of its room; 1 is the lowest.
 
-    A module of a room without a contract of its own has none.
+    Modules of rooms without a contract are left out.
     """
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     layers = {}

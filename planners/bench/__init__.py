@@ -1,1 +1,1 @@
-"""Benchmarks: how fast planners are, and whether they find published lengths."""
+"""Benchmarks: the speed of planners, and their lengths compared with published ones."""

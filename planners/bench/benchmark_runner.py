@@ -1,4 +1,4 @@
-"""A planner on a map, asked one query after another, and what comes of it."""
+"""One planner on one map: answers to queries, compared with published lengths."""
 
 from __future__ import annotations
 
@@ -20,40 +20,40 @@ from planners.registry import get_planner
 from planners.search.astar3d import AStar3D
 from planners.search.base import Engine, SearchResult, SearchSettings
 
-ANY_ANGLE = frozenset({"lazy_theta", "polyanya", "theta"})  # planners that may cut short
-TOLERANCE = 0.01  # [cells] published lengths carry 2 to 8 decimals
+ANY_ANGLE = frozenset({"lazy_theta", "polyanya", "theta"})  # their routes can be shorter
+TOLERANCE = 0.01  # [cells] published lengths have 2 to 8 decimals
 
 
 class BenchmarkAnswer(NamedTuple):
-    """What a planner made of a query."""
+    """Answer of a planner to a query."""
 
     query: MovingAIQuery
-    length: float | None  #: of the route [cells]; None if there was none
-    ms: float  #: time that the search took
-    agrees: bool  #: with what was published
+    length: float | None  #: length of the route [cells]; None without a route
+    ms: float  #: search time
+    agrees: bool  #: whether it agrees with the published length
 
 
 class BenchmarkRunner:
-    """A planner on a map, ready to be asked: the robot is a point, cells are of 1 m.
+    """A planner on a map; the robot is a point and a cell is 1 m wide.
 
     Parameters
     ----------
-    result : BlockedMap or BlockedVoxels
+    blocked_map : BlockedMap or BlockedVoxels
     planner : str
     """
 
-    def __init__(self, result: BlockedMap | BlockedVoxels, planner: str) -> None:
+    def __init__(self, blocked_map: BlockedMap | BlockedVoxels, planner: str) -> None:
         settings_class = get_planner(planner).settings
         self.planner, self.settings = planner, settings_class()
-        grid = grid_of(result)
+        grid = grid_of(blocked_map)
         began = time.perf_counter()
-        corner = (0.5,) * result.blocked.ndim
+        corner = (0.5,) * blocked_map.blocked.ndim
         problem = PlanningProblem(grid, start=corner, goal=corner, footprint=0.0, clear_start=False)
         self.engine = self._engine(problem)
         self.setup_ms = 1e3 * (time.perf_counter() - began)
 
-    def ask(self, query: MovingAIQuery) -> BenchmarkAnswer:
-        """Return the planner's answer; running out of time, or of ideas, is none."""
+    def run(self, query: MovingAIQuery) -> BenchmarkAnswer:
+        """Return the answer of the planner; without a route where it reaches a limit."""
         start, goal = (
             tuple(index + 0.5 for index in cell[::-1]) for cell in (query.start, query.goal)
         )
@@ -78,9 +78,9 @@ class BenchmarkRunner:
         return AStar3D(Voxels.of(problem))
 
     def _agrees(self, query: MovingAIQuery, result: SearchResult) -> bool:
-        """Whether a route is as long as published, or as much longer as its planner grants.
+        """Whether the length is the published one, times at most the bound of the planner.
 
-        A planner of any angle may cut short: down to the straight line.
+        Any-angle routes can be shorter than published, but not shorter than the straight line.
         """
         if result.headings is not None or not query.solvable:
             return False
@@ -95,7 +95,7 @@ class BenchmarkRunner:
 
 
 def figures(answers: list[BenchmarkAnswer]) -> dict[str, Any]:
-    """Return how many queries there were, solved and mismatched, and how long they took [ms].
+    """Return the counts of queries, solutions and mismatches, and search times [ms].
 
     Examples
     --------
@@ -115,23 +115,28 @@ def figures(answers: list[BenchmarkAnswer]) -> dict[str, Any]:
 
 
 def warm_up(planner: str, dimensions: int) -> None:
-    """Have everything compiled, or loaded, that a query takes; the planner must solve a simple one.
+    """Solve a query along a diagonal, so that everything is compiled and loaded.
+
+    Parameters
+    ----------
+    planner : str
+    dimensions : 2 or 3
 
     Raises
     ------
     ProblemError
-        It turns in curves, grants no bound, or does not get along diagonals as it should.
+        The length is wrong or not comparable: the planner drives curves or has no bound.
     """
     free = np.zeros((4,) * dimensions, dtype=np.bool_)
-    result: BlockedMap | BlockedVoxels = BlockedVoxels(free, 1.0, (0.0, 0.0, 0.0))
+    blocked_map: BlockedMap | BlockedVoxels = BlockedVoxels(free, 1.0, (0.0, 0.0, 0.0))
     if dimensions == 2:
-        result = BlockedMap(free, free, 1.0, (0.0, 0.0))
+        blocked_map = BlockedMap(free, free, 1.0, (0.0, 0.0))
     corners = (0,) * dimensions, (3,) * dimensions
     query = MovingAIQuery(Path(), free.shape, *corners, math.dist(*corners), 0)
-    runner = BenchmarkRunner(result, planner)
+    runner = BenchmarkRunner(blocked_map, planner)
     try:
-        agrees = runner.ask(query).agrees
-    except ProblemError:  # such as a place without a heading
+        agrees = runner.run(query).agrees
+    except ProblemError:  # such as a missing heading
         agrees = False
     if not agrees:
         expected = "one that moves between cells, or at any angle, up to a bound of the shortest"

@@ -1,4 +1,4 @@
-"""Queries on maps that come without any: two places far apart that a way joins."""
+"""Queries on maps without published ones: two distant places in the same free region."""
 
 from __future__ import annotations
 
@@ -22,33 +22,39 @@ from planners.errors import ProblemError
 from planners.problem.footprint import Footprint
 from planners.problem.problem import PlanningProblem
 
-TRIES = 64  # places, of which the two are taken that are farthest apart
-SEED = 0  # of the places
+SAMPLES = 64  # random places; the two most distant ones are start and goal
+SEED = 0  # of the random places
 
 
 def find_maps(path: Path) -> list[Path]:
-    """Return a map's file, or those of all maps below a folder.
+    """Return the file of a map, or the files of all maps below a folder.
 
     Raises
     ------
     InputError
-        Nothing of that name, or no map below the folder.
+        The path does not exist, or there is no map below the folder.
     """
     if path.is_file():
         return [path]
     if not path.exists():
         raise InputError(str(path), "a map, or a folder with maps", "nothing of that name")
-    found = sorted(file for file in path.rglob("*") if file.suffix.lower() in LOADERS)
-    if not found:
+    files = sorted(file for file in path.rglob("*") if file.suffix.lower() in LOADERS)
+    if not files:
         raise InputError(str(path), f"a folder with maps ({', '.join(LOADERS)})", "none")
-    return found
+    return files
 
 
 def cases_on(map_file: Path, footprint: Any, *, turning_radius: float) -> Cases:
-    """Return the same query on a map in every space that it has.
+    """Return one query on a map, for every state space of its dimension.
 
-    Start and goal lie in the largest region that the disc around the footprint can move in; the
-    robot looks from one to the other. In 3-D the footprint is a ball of the disc's radius.
+    Start and goal lie in the largest region in which the disc around the footprint can move; both
+    headings point from the start to the goal. In 3-D the footprint is a ball of the same radius.
+
+    Parameters
+    ----------
+    map_file : Path
+    footprint : float [m] or array_like, shape (n, 2) [m, base_link]
+    turning_radius : float [m]
 
     Raises
     ------
@@ -69,19 +75,19 @@ def cases_on(map_file: Path, footprint: Any, *, turning_radius: float) -> Cases:
 
 
 def _make_problem(grid: ConfidenceGrid, footprint: Footprint) -> PlanningProblem:
-    """Return a problem between two places far apart."""
+    """Return a problem between two distant places."""
     low, high = np.split(grid.bounds(), 2)
     centre = tuple(((low + high) / 2.0).tolist())
     blank = PlanningProblem(grid, start=centre, goal=centre, footprint=footprint, clear_start=False)
-    start, goal = _far_apart(Costmap.of(blank) if grid.ndim == 2 else Voxels.of(blank))
+    start, goal = _distant_places(Costmap.of(blank) if grid.ndim == 2 else Voxels.of(blank))
     if grid.ndim == 3:
         return replace(blank, start=tuple(start), goal=tuple(goal))
     yaw = math.atan2(*(goal - start)[::-1])
     return replace(blank, start=(*start, yaw), goal=(*goal, yaw))
 
 
-def _far_apart(space: Costmap | Voxels) -> tuple[Floats, Floats]:
-    """Return the centres of two cells of the largest region of places for the footprint."""
+def _distant_places(space: Costmap | Voxels) -> tuple[Floats, Floats]:
+    """Return the centres of two distant cells in the largest traversable region [m, map]."""
     regions, count = ndimage.label(space.traversable)
     if count == 0:
         needed = f"a place for a footprint of radius {space.radius:.2f} m"
@@ -89,7 +95,7 @@ def _far_apart(space: Costmap | Voxels) -> tuple[Floats, Floats]:
     largest = 1 + int(np.argmax(np.bincount(regions.ravel())[1:]))
     cells = np.argwhere(regions == largest)
     rng = np.random.default_rng(SEED)
-    places = space.window.cell_to_world(cells[rng.integers(len(cells), size=TRIES)])
-    apart = np.linalg.norm(places[:, None] - places, axis=-1)
-    i, j = np.unravel_index(int(np.argmax(apart)), apart.shape)
+    places = space.window.cell_to_world(cells[rng.integers(len(cells), size=SAMPLES)])
+    distances = np.linalg.norm(places[:, None] - places, axis=-1)
+    i, j = np.unravel_index(int(np.argmax(distances)), distances.shape)
     return places[i], places[j]

@@ -1,8 +1,8 @@
-"""What it takes to check a motion: compiled, all of it at once, against a Python lambda per state.
+"""Time to validate a motion: one compiled call per motion against a Python lambda per state.
 
-Both are asked through OMPL. The lambda is what one writes first, and OMPL asks it as it comes: from
-cell to cell along the motion. That misses corners which are cut between two cells; the compiled
-check misses nothing.
+OMPL calls both. The lambda is the usual state validity checker; OMPL calls it at states one cell
+apart along a motion, which misses corners that are cut between two states. The compiled check is
+exact.
 """
 
 from __future__ import annotations
@@ -25,25 +25,25 @@ from planners.sampling.ompl_module import ompl, redirect_log
 from planners.sampling.ompl_states import edge_check, information_of, reader, space_of, state_of
 from planners.sampling.settings import SamplingSettings, StateSpace
 
-POINTS = 40  # on an outline, that the lambda looks at
-MOST = 5000  # edges of a search that are asked again
-STEP = 0.999  # [cells] from state to state, so that rounding makes it no more than one
-GLANCE = 64  # questions whether to stop between two looks at the clock
+POINTS = 40  # points on an outline that the lambda checks
+MAX_EDGES = 5000  # edges of a search that are recorded and checked again
+STEP = 0.999  # [cells] between states; below 1, so that rounding does not exceed one cell
+CLOCK_INTERVAL = 64  # calls of the termination condition between two readings of the clock
 EXACT = "EXACT_SOLUTION"
 COMPILED, LAMBDA, REACH = "compiled", "lambda", "compiled, own range"
 
 
 class MotionQuery(NamedTuple):
-    """Where from, where to, and what OMPL samples."""
+    """Start, goal, and the bounds that OMPL samples in."""
 
     validator: MotionValidator
-    start: Pose  #: as a state
-    goal: Pose
+    start: Pose  #: state of the validator
+    goal: Pose  #: state of the validator
     room: Bounds
 
 
 class Search(NamedTuple):
-    """How long a search took, and whether it found a route."""
+    """Duration and success of a search."""
 
     seconds: float
     solved: bool
@@ -59,35 +59,34 @@ def compare_motions(
 ) -> list[dict[str, Any]]:
     """Return figures of both checks, over all queries and seeds.
 
-    The space is "r2" for a radius and "se2" for an outline. Rows of the workload "motions" are
-    about edges that RRT-Connect asked for, all asked again; those of "first route" about the whole
-    of RRT-Connect, with OMPL's range for edges and, at last, with that of `MotionValidator.reach`.
+    The space is "r2" for a radius and "se2" for an outline. Rows of the workload "motions" repeat
+    the checks of the edges that RRT-Connect needed. Rows of "first route" are searches of
+    RRT-Connect, with OMPL's default range and, in the last row, that of `MotionValidator.reach`.
 
     Parameters
     ----------
     grid : ConfidenceGrid
     footprint : float or array_like, shape (n, 2) [m, base_link]
     queries : sequence of (start, goal)
-        x, y [m, map] and, for an outline, yaw [rad]. Those that have no route are left out.
+        x, y [m, map] and, for an outline, yaw [rad]. Queries without a route are left out.
     seeds : int
     time_limit : float [s]
-        Of a search.
+        Time limit of a search.
 
     Returns
     -------
     list of dict
-        ``workload``, ``system``, ``median_ms`` and ``p95_ms`` of a search or the edges of one,
-        ``ratio`` (by how much faster than the lambda), ``motions_per_s``, and ``agree``, the share
-        of edges about which both say the same, and ``solved``, the share of searches that found a
-        route. Times are those that the processor took.
+        ``workload``, ``system``, ``median_ms`` and ``p95_ms`` of a search or of the edges of one
+        search, ``ratio`` (speed-up over the lambda), ``motions_per_s``, ``agree`` (share of edges
+        with equal results) and ``solved`` (share of searches with a route). Times are CPU times.
 
     Raises
     ------
     ProblemError
-        No query is left.
+        No query can have a route.
     """
-    asked = _possible(grid, footprint, queries)
-    runs = [(query, seed) for query in asked for seed in range(seeds)]
+    solvable = _solvable_queries(grid, footprint, queries)
+    runs = [(query, seed) for query in solvable for seed in range(seeds)]
     with redirect_log():
         lists = [_edges_of(query, seed, time_limit) for query, seed in runs]
         motions = {
@@ -98,23 +97,23 @@ def compare_motions(
             for system in (LAMBDA, COMPILED)
         }
         routes = {
-            system: [_first(query, system, seed, time_limit) for query, seed in runs]
+            system: [_first_route(query, system, seed, time_limit) for query, seed in runs]
             for system in (LAMBDA, COMPILED, REACH)
         }
-    space = asked[0].validator.space
+    space = solvable[0].validator.space
     return [*_motion_rows(space, motions), *_route_rows(space, routes)]
 
 
 def _motion_rows(space: StateSpace, motions: dict[str, list[Any]]) -> Iterator[dict[str, Any]]:
     """Yield a row per check."""
-    answers = {name: np.concatenate([a for _, a in found]) for name, found in motions.items()}
+    answers = {name: np.concatenate([valid for _, valid in runs]) for name, runs in motions.items()}
     agree = float(np.mean(answers[LAMBDA] == answers[COMPILED]))
-    total = {name: sum(seconds for seconds, _ in found) for name, found in motions.items()}
-    for name, found in motions.items():
+    total = {name: sum(seconds for seconds, _ in runs) for name, runs in motions.items()}
+    for name, runs in motions.items():
         yield {
             "workload": f"motions, {space}",
             "system": name,
-            **_spread([seconds for seconds, _ in found]),
+            **_percentiles([seconds for seconds, _ in runs]),
             "ratio": total[LAMBDA] / total[name],
             "motions_per_s": len(answers[name]) / total[name],
             "agree": agree,
@@ -124,27 +123,29 @@ def _motion_rows(space: StateSpace, motions: dict[str, list[Any]]) -> Iterator[d
 
 def _route_rows(space: StateSpace, routes: dict[str, list[Search]]) -> Iterator[dict[str, Any]]:
     """Yield a row per check and range."""
-    times = {name: [search.seconds for search in found] for name, found in routes.items()}
-    for name, found in routes.items():
+    times = {name: [search.seconds for search in searches] for name, searches in routes.items()}
+    for name, searches in routes.items():
         yield {
             "workload": f"first route, {space}",
             "system": name,
-            **_spread(times[name]),
+            **_percentiles(times[name]),
             "ratio": float(np.median(times[LAMBDA]) / np.median(times[name])),
             "motions_per_s": None,
             "agree": None,
-            "solved": float(np.mean([search.solved for search in found])),
+            "solved": float(np.mean([search.solved for search in searches])),
         }
 
 
-def _spread(seconds: list[float]) -> dict[str, float]:
+def _percentiles(seconds: list[float]) -> dict[str, float]:
     median, high = 1e3 * np.percentile(seconds, [50, 95])
     return {"median_ms": float(median), "p95_ms": float(high)}
 
 
-def _possible(grid: ConfidenceGrid, footprint: Any, queries: Sequence[Any]) -> list[MotionQuery]:
-    """Return the queries that may have a route."""
-    found, validator = [], None
+def _solvable_queries(
+    grid: ConfidenceGrid, footprint: Any, queries: Sequence[Any]
+) -> list[MotionQuery]:
+    """Return the queries that can have a route."""
+    solvable, validator = [], None
     for start, goal in queries:
         if validator is None:
             problem = PlanningProblem(
@@ -157,16 +158,16 @@ def _possible(grid: ConfidenceGrid, footprint: Any, queries: Sequence[Any]) -> l
         if all(validator.is_clear(*end, *end) for end in ends):
             room = validator.room(*ends)
             if room is not None:
-                found.append(MotionQuery(validator, *ends, room))
-    if not found:
-        raise ProblemError("queries", "one that may have a route", "none")
-    return found
+                solvable.append(MotionQuery(validator, *ends, room))
+    if not solvable:
+        raise ProblemError("queries", "one that can have a route", "none")
+    return solvable
 
 
 def _information(
     query: MotionQuery, system: str, edges: list[tuple[Pose, Pose]] | None = None
 ) -> Any:
-    """Return OMPL's space with one of the checks; what is asked is appended to `edges`."""
+    """Return OMPL's space information with one of the checks, which records its `edges`."""
     base, validator = ompl().base, query.validator
     space = space_of(base, validator.space, query.room, SamplingSettings())
     if system == LAMBDA:
@@ -177,21 +178,23 @@ def _information(
         return information
     check = edge_check(validator, count(1), lambda: None)
     if edges is not None:
-        check = _recording(check, reader(validator.space), edges)
+        check = _record_edges(check, reader(validator.space), edges)
     return information_of(base, space, check)
 
 
-def _recording(check: Callable[..., bool], read: Any, edges: list[Any]) -> Callable[..., bool]:
-    def recording(ompl_validator: Any, a: Any, b: Any, _: Any = None) -> bool:
-        if len(edges) < MOST:
+def _record_edges(check: Callable[..., bool], read: Any, edges: list[Any]) -> Callable[..., bool]:
+    """Return a check that also appends the first edges to a list."""
+
+    def record(ompl_validator: Any, a: Any, b: Any, _: Any = None) -> bool:
+        if len(edges) < MAX_EDGES:
             edges.append((read(a), read(b)))
         return check(ompl_validator, a, b)
 
-    return recording
+    return record
 
 
 def _set_steps(space: Any, validator: MotionValidator) -> None:
-    """Have OMPL look at states that are a cell apart, or at which the outline has turned by one."""
+    """Set OMPL's steps: no point of the footprint moves by more than about one cell."""
     size = validator.costmap.window.resolution
     plane = space if validator.space == "r2" else space.getSubspace(0)
     plane.setLongestValidSegmentFraction(STEP * size / plane.getMaximumExtent())
@@ -202,10 +205,10 @@ def _set_steps(space: Any, validator: MotionValidator) -> None:
 
 
 def lambda_of(validator: MotionValidator) -> Callable[[Any], bool]:
-    """Return what tells in Python whether a state of OMPL's is clear.
+    """Return a state validity checker in Python.
 
-    In "r2" it looks up the state's cell: whether the footprint's centre may be on the cell's. In
-    "se2" it looks up the cells of points on the outline.
+    In "r2" a state is valid if its cell is traversable. In "se2" it is valid if none of the cells
+    under points on the outline is blocked.
     """
     size = validator.costmap.window.resolution
     if validator.space == "r2":
@@ -213,7 +216,7 @@ def lambda_of(validator: MotionValidator) -> Callable[[Any], bool]:
         return lambda state: not blocked[int(state[1] / size), int(state[0] / size)]
     points = _outline(validator) / size
     across, along = points.T
-    margin = math.ceil(float(np.hypot(across, along).max())) + 1  # it may reach off the map
+    margin = math.ceil(float(np.hypot(across, along).max())) + 1  # the outline can leave the map
     padded: Bools = np.pad(validator.costmap.blocked, margin, constant_values=True)
 
     def is_valid(state: Any) -> bool:
@@ -226,7 +229,7 @@ def lambda_of(validator: MotionValidator) -> Callable[[Any], bool]:
 
 
 def _outline(validator: MotionValidator) -> Floats:
-    """Return about 40 points on the outline, evenly spread along its sides [m, base_link]."""
+    """Return about 40 points on the outline, evenly spaced on each side [m, base_link]."""
     corners = np.asarray(validator.costmap.problem.shape.polygon)
     closed = np.concatenate([corners, corners[:1]])
     spacing = np.hypot(*np.diff(closed, axis=0).T).sum() / POINTS
@@ -240,7 +243,7 @@ def _outline(validator: MotionValidator) -> Floats:
 def _search(
     query: MotionQuery, information: Any, *, seed: int, longest: float, limit: float
 ) -> Search:
-    """Have RRT-Connect search; `longest` is of an edge [m], 0 for OMPL's own."""
+    """Search with RRT-Connect; `longest` is the maximum length of an edge [m], 0 for OMPL's."""
     modules, kind = ompl(), query.validator.space
     modules.util.RNG.setSeed(seed + 1)  # 0 is refused
     space = information.getStateSpace()
@@ -250,10 +253,10 @@ def _search(
     planner.setRange(longest)
     planner.setProblemDefinition(task)
     planner.setup()
-    looks, until = count(1), time.thread_time() + limit
+    calls, deadline = count(1), time.thread_time() + limit
 
     def stop() -> bool:
-        return not next(looks) % GLANCE and time.thread_time() >= until
+        return not next(calls) % CLOCK_INTERVAL and time.thread_time() >= deadline
 
     began = time.thread_time()
     status = planner.solve(modules.base.PlannerTerminationCondition(stop))
@@ -262,14 +265,14 @@ def _search(
 
 
 def _edges_of(query: MotionQuery, seed: int, limit: float) -> list[tuple[Pose, Pose]]:
-    """Return the edges that a search asks for, the first thousands of them."""
+    """Return the first edges that a search checks, at most `MAX_EDGES`."""
     edges: list[tuple[Pose, Pose]] = []
     _search(query, _information(query, COMPILED, edges), seed=seed, longest=0.0, limit=limit)
     return edges
 
 
-def _first(query: MotionQuery, system: str, seed: int, limit: float) -> Search:
-    """Search with one of the checks."""
+def _first_route(query: MotionQuery, system: str, seed: int, limit: float) -> Search:
+    """Search for a first route with one of the checks."""
     validator = query.validator
     longest = validator.reach(validator.region(query.start), query.room) if system == REACH else 0.0
     return _search(query, _information(query, system), seed=seed, longest=longest, limit=limit)
@@ -278,7 +281,7 @@ def _first(query: MotionQuery, system: str, seed: int, limit: float) -> Search:
 def _time_checks(
     query: MotionQuery, system: str, edges: Sequence[tuple[Pose, Pose]]
 ) -> tuple[float, Bools]:
-    """Return how long it takes to check edges through OMPL [s], and what came of each."""
+    """Return the time to check edges through OMPL [s], and the result of each check."""
     information, kind = _information(query, system), query.validator.space
     space = information.getStateSpace()
     pairs = [(state_of(space, a, kind), state_of(space, b, kind)) for a, b in edges]

@@ -1,4 +1,4 @@
-"""The MovingAI benchmark: its queries put to a planner, its published lengths held against it."""
+"""The MovingAI benchmark: lengths and times of a planner, compared with published lengths."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ SUFFIXES = {".scen", ".3dscen"}
 class Workload(NamedTuple):
     """Queries of one file on one map."""
 
-    name: str  #: the map's, with the folders that lead to it
-    scen: Path  #: where the queries stand
+    name: str  #: path of the map below the folder of the benchmark
+    scen: Path  #: file of the queries
     map_file: Path
     queries: list[MovingAIQuery]
 
@@ -31,7 +31,7 @@ class WorkloadResult(NamedTuple):
     """A planner's answers to a workload."""
 
     workload: Workload
-    setup_ms: float  #: from the map's grid to a planner that can be asked
+    setup_ms: float  #: time to build costmap and engine from the grid
     answers: list[BenchmarkAnswer]
 
 
@@ -42,14 +42,14 @@ def find_workloads(path: Path, *, limit: int | None = None) -> list[Workload]:
     ----------
     path : Path
     limit : int, optional
-        Of each file take that many queries at most, evenly spread over it.
+        Maximum number of queries per file, evenly spaced in the file.
 
     Raises
     ------
     FileFormatError
-        A file that breaks its format, or names a map that is not beside it.
+        A file violates its format, or its map is missing.
     InputError
-        Nothing of that name, no such file below the folder, no query in any.
+        The path does not exist, or there is no file or no query below it.
     """
     if not path.exists():
         raise InputError(str(path), "a folder, or a .scen", "nothing of that name")
@@ -69,7 +69,7 @@ def run(
     *,
     watch: Callable[[list[Any]], Iterable[Any]] = lambda steps: steps,
 ) -> list[WorkloadResult]:
-    """Return a planner's answers: on each map an engine of its own, asked time and again.
+    """Return the answers of a planner, which builds one engine per map for all its queries.
 
     Parameters
     ----------
@@ -77,26 +77,26 @@ def run(
     planner : str
         A name in `planners.PLANNERS`; on voxels, ``"astar"``.
     watch : callable, optional
-        Given the list of queries, yields them one by one: for progress.
+        Receives the list of queries and yields each of them, to show progress.
 
     Raises
     ------
     ProblemError
-        No planner of that name, or one whose lengths can't be compared.
+        There is no planner of that name, or its lengths can't be compared.
     FileFormatError
-        A map that breaks its format, or is none that its queries are about.
+        A map violates its format, or does not have the size that the queries state.
     """
     workloads = list(workloads)
     for dimensions in {len(work.queries[0].start) for work in workloads}:
         warm_up(planner, dimensions)
     results: list[WorkloadResult] = []
     runner: BenchmarkRunner | None = None
-    asked = [(work, query) for work in workloads for query in work.queries]
-    for work, query in watch(asked):
+    steps = [(work, query) for work in workloads for query in work.queries]
+    for work, query in watch(steps):
         if runner is None or results[-1].workload is not work:
             runner = BenchmarkRunner(read_map(work), planner)
             results.append(WorkloadResult(work, runner.setup_ms, []))
-        results[-1].answers.append(runner.ask(query))
+        results[-1].answers.append(runner.run(query))
     return results
 
 
@@ -108,30 +108,30 @@ def _workloads(scen: Path, root: Path, limit: int | None) -> list[Workload]:
     queries = read_movingai_scen(scen)
     if limit is not None and len(queries) > limit:
         queries = [queries[i] for i in np.linspace(0, len(queries) - 1, limit).round().astype(int)]
-    found = []
-    by_map = sorted(queries, key=lambda query: query.map_file)  # stable: else as in the file
+    workloads = []
+    by_map = sorted(queries, key=lambda query: query.map_file)  # stable: keeps the file's order
     for map_file, group in groupby(by_map, key=lambda query: query.map_file):
-        asked = list(group)
+        on_map = list(group)
         if not map_file.is_file():
             expected = f"its map {map_file.name} beside it"
-            raise FileFormatError(scen, expected, "no such file", line=asked[0].line)
+            raise FileFormatError(scen, expected, "no such file", line=on_map[0].line)
         name = map_file.relative_to(root) if root.is_dir() else Path(map_file.name)
-        found.append(Workload(name.as_posix(), scen, map_file, asked))
-    return found
+        workloads.append(Workload(name.as_posix(), scen, map_file, on_map))
+    return workloads
 
 
 def read_map(work: Workload) -> BlockedMap | BlockedVoxels:
-    """Read the map of a workload, and check that it is the one that the queries are about."""
-    found: BlockedMap | BlockedVoxels
+    """Read the map of a workload, and check that it fits the queries."""
+    blocked_map: BlockedMap | BlockedVoxels
     if len(work.queries[0].start) == 3:
-        found = read_movingai_voxels(work.map_file)
+        blocked_map = read_movingai_voxels(work.map_file)
     else:
-        found = read_movingai_map(work.map_file)
-    shape = found.blocked.shape
+        blocked_map = read_movingai_map(work.map_file)
+    shape = blocked_map.blocked.shape
     for query in work.queries:
         inside = (np.maximum(query.start, query.goal) < shape).all()
         if query.shape not in ((), shape) or not inside:
             size = " x ".join(map(str, shape[::-1]))
             expected = f"a query on {work.map_file.name}, which is {size} cells"
             raise FileFormatError(work.scen, expected, "another", line=query.line)
-    return found
+    return blocked_map

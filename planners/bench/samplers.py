@@ -1,4 +1,4 @@
-"""Sampling planners side by side: who finds a way, how soon, how good, and how it gets better."""
+"""Comparison of sampling planners: success, time of the first route, costs over time."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from planners.bench.worker_pool import worker_pool
 from planners.sampling.settings import StateSpace, refusal
 
 SPACES: tuple[StateSpace, ...] = get_args(StateSpace)
-PATIENCE = 120.0  # [s] beyond the time limit, for what is made and compiled before
+PATIENCE = 120.0  # [s] beyond the time limit, for compilation and for building maps
 MOMENTS = 80  # points of a curve, at most
 COST_TOLERANCE = 1e-9  # relative, of costs
-FINDS = 3  # what everybody may tell: a route as it was found, as it was checked, and simplified
+FINDS = 3  # reports of a planner that stops at its first route: found, validated and simplified
 
 
 class Refused(NamedTuple):
-    """What is not tried, and why."""
+    """A planner that does not support a state space."""
 
     planner: str
     space: StateSpace
@@ -49,14 +49,25 @@ def list_trials(
     time_limit: float,
     improve_for: float,
 ) -> tuple[list[Trial], list[Refused]]:
-    """Return what is to be tried, seed after seed, and what is refused.
+    """Return all trials, seed after seed, and the planners that a space does not support.
 
-    A workload that has no query in a space is left out there.
+    There are no trials of a workload in a space in which it has no query.
+
+    Parameters
+    ----------
+    works : sequence of Workload
+    planners : sequence of str
+    spaces : sequence of StateSpace
+    seeds : int
+        Number of seeds; they count from 0.
+    time_limit : float [s]
+    improve_for : float [s]
+        Time to keep improving after the first route.
     """
-    asked = [space for space in spaces if any(space in work.cases() for work in works)]
-    pairs = list(product(planners, asked))
+    used = [space for space in spaces if any(space in work.cases() for work in works)]
+    pairs = list(product(planners, used))
     refused = [Refused(*pair, reason) for pair in pairs if (reason := refusal(*pair))]
-    out = {pair[:2] for pair in refused}
+    excluded = {pair[:2] for pair in refused}
     trials = [
         Trial(work, space, planner, seed, time_limit, improve_for)
         for seed in range(seeds)
@@ -64,7 +75,7 @@ def list_trials(
         for space in spaces
         if space in work.cases()
         for planner in planners
-        if (planner, space) not in out
+        if (planner, space) not in excluded
     ]
     return trials, refused
 
@@ -75,9 +86,17 @@ def run(
     jobs: int,
     watch: Callable[[Iterable[Any]], Iterable[Any]] = lambda steps: steps,
 ) -> list[Race]:
-    """Return the races of all trials, run by so many processes, in the order they were entered.
+    """Return the races of all trials, in the order of the trials.
 
-    A planner that crashes or hangs ends its process and loses the trial; the others go on.
+    A planner that crashes or hangs loses its trial; the other trials continue.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+    jobs : int
+        Number of processes.
+    watch : callable, optional
+        Receives the iterator over completed trials and yields each of them, to show progress.
     """
     races: dict[tuple[Workload, StateSpace, str], Race] = {}
     for work, space, planner, *_ in trials:
@@ -92,17 +111,23 @@ def run(
 
 
 class Optimum(NamedTuple):
-    """What costs are held against."""
+    """The cost that costs are compared with."""
 
-    cost: float | None  #: None if nobody found a route
-    is_best_known: bool  #: whether it is only the best that anybody in the run came by
+    cost: float | None  #: None if no planner found a route
+    is_best_known: bool  #: whether it is only the best cost of the run
 
 
 def optima(
     works: Sequence[Workload], races: Sequence[Race]
 ) -> dict[tuple[str, StateSpace], Optimum]:
-    """Return for each workload and space the least cost: in "r2" of the best route at any angle."""
-    found: dict[tuple[str, StateSpace], Optimum] = {}
+    """Return the least cost for each workload and space; in "r2" that of `trials.shortest`.
+
+    Parameters
+    ----------
+    works : sequence of Workload
+    races : sequence of Race
+    """
+    least: dict[tuple[str, StateSpace], Optimum] = {}
     by_name = {work.name: work for work in works}
     for name, space in dict.fromkeys((race.work, race.space) for race in races):
         costs = [
@@ -115,22 +140,28 @@ def optima(
         known = shortest(by_name[name].cases()[space]) if space == "r2" else None
         best = min(costs, default=None)
         if known is not None and (best is None or known <= best * (1.0 + COST_TOLERANCE)):
-            found[name, space] = Optimum(known, is_best_known=False)
+            least[name, space] = Optimum(known, is_best_known=False)
         else:
-            found[name, space] = Optimum(best, is_best_known=True)
-    return found
+            least[name, space] = Optimum(best, is_best_known=True)
+    return least
 
 
 def row(race: Race, optimum: Optimum) -> dict[str, Any]:
-    """Return the figures of a race; costs and first times are of the attempts with a route.
+    """Return the figures of a race; costs and first times are those of solved attempts.
 
-    ``first_ms`` is when there was a route, the costmap included; ``median_ms`` and ``p95_ms`` when
-    the planner handed one out, bettered as long as it was told to, or gave up.
+    ``first_ms`` is the time of the first route, the costmap included; ``median_ms`` and ``p95_ms``
+    are total times, the improvement of the route included.
+
+    Parameters
+    ----------
+    race : Race
+    optimum : Optimum
+        Of the workload and space of the race.
     """
-    won = [attempt for attempt in race.attempts if attempt.solved]
+    solved = [attempt for attempt in race.attempts if attempt.solved]
     ms = [1e3 * attempt.seconds for attempt in race.attempts]
-    first = [1e3 * attempt.first for attempt in won]
-    cost = float(np.median([attempt.cost for attempt in won])) if won else None
+    first = [1e3 * attempt.first for attempt in solved]
+    cost = float(np.median([attempt.cost for attempt in solved])) if solved else None
     ratio = cost / optimum.cost if cost is not None and optimum.cost else None
     reasons = Counter(attempt.reason for attempt in race.attempts if not attempt.solved)
     curve = progress(race, optimum.cost) if optimum.cost else []
@@ -139,10 +170,10 @@ def row(race: Race, optimum: Optimum) -> dict[str, Any]:
         "space": race.space,
         "system": race.planner,
         "queries": len(race.attempts),
-        "solved": len(won),
-        "success": len(won) / len(race.attempts),
-        "first_ms": float(np.median(first)) if won else None,
-        "first_p95_ms": float(np.percentile(first, 95)) if won else None,
+        "solved": len(solved),
+        "success": len(solved) / len(race.attempts),
+        "first_ms": float(np.median(first)) if solved else None,
+        "first_p95_ms": float(np.percentile(first, 95)) if solved else None,
         "cost": cost,
         "optimum": optimum.cost,
         "best_known": optimum.is_best_known,
@@ -157,20 +188,28 @@ def row(race: Race, optimum: Optimum) -> dict[str, Any]:
 def progress(race: Race, optimum: float) -> list[tuple[float, float]]:
     """Return the median ratio to the optimum over time, as (seconds, ratio).
 
-    An attempt without a route counts as infinitely dear, so a curve begins when more than half of
-    all attempts have one. Of a planner that stops at its first route, and of one that solves half
-    or less, there is only one point: the medians of what was handed out.
+    The cost of an attempt without a route is infinite, so the curve begins when more than half of
+    the attempts have a route. A planner that stops at its first route, or solves at most half of
+    the attempts, has one point: the median time and ratio of the returned routes.
+
+    Parameters
+    ----------
+    race : Race
+    optimum : float
+        Cost that the costs are divided by.
     """
-    won = [attempt for attempt in race.attempts if attempt.solved]
-    if not won:
+    solved = [attempt for attempt in race.attempts if attempt.solved]
+    if not solved:
         return []
-    end = float(np.median([attempt.betters[-1][0] for attempt in won]))
-    if 2 * len(won) <= len(race.attempts) or all(len(one.betters) <= FINDS for one in won):
-        return [(end, float(np.median([attempt.cost for attempt in won])) / optimum)]
-    moments = _moments(np.array([time for attempt in won for time, _ in attempt.betters]), end)
+    end = float(np.median([attempt.improvements[-1][0] for attempt in solved]))
+    stops_at_first = all(len(attempt.improvements) <= FINDS for attempt in solved)
+    if 2 * len(solved) <= len(race.attempts) or stops_at_first:
+        return [(end, float(np.median([attempt.cost for attempt in solved])) / optimum)]
+    times = [time for attempt in solved for time, _ in attempt.improvements]
+    moments = _moments(np.array(times), end)
     best = np.full((len(race.attempts), len(moments) + 1), np.inf)
-    for attempt, costs in zip(won, best, strict=False):
-        for time, cost in attempt.betters:
+    for attempt, costs in zip(solved, best, strict=False):
+        for time, cost in attempt.improvements:
             costs[:-1][moments >= time] = cost
         costs[-1] = attempt.cost
     median = np.median(best, axis=0) / optimum
@@ -179,12 +218,12 @@ def progress(race: Race, optimum: float) -> list[tuple[float, float]]:
 
 
 def processors() -> int:
-    """Return how many processors this process may use."""
+    """Return the number of processors that this process can use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _moments(times: Floats, end: float) -> Floats:
-    """Return so many of the times up to the end, evenly spread over their logarithm."""
+    """Return at most `MOMENTS` of the times before the end, evenly spaced in their logarithm."""
     early: Floats = np.unique(times[times < end])
     if len(early) <= MOMENTS:
         return early

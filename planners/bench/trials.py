@@ -1,4 +1,4 @@
-"""One sampling planner, one query, one seed: what comes of it, and when."""
+"""Run one sampling planner on one query with one seed, and record its costs over time."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from planners.search.base import Improvement
 
 
 class Workload(NamedTuple):
-    """Where a query is: one of `WORKLOADS` by name, or a map with what drives there."""
+    """One of `WORKLOADS` by name, or a map with the footprint that moves on it."""
 
     name: str
     map_file: Path | None = None
@@ -29,7 +29,7 @@ class Workload(NamedTuple):
     turning_radius: float = 1.0
 
     def cases(self) -> Cases:
-        """Return its queries, made once in a process."""
+        """Return the queries; they are built once per process."""
         return _cases(self)
 
 
@@ -41,41 +41,41 @@ def _cases(work: Workload) -> Cases:
 
 
 class Trial(NamedTuple):
-    """What is tried: a planner in a space, with one seed."""
+    """A planner in a state space with one seed."""
 
     work: Workload
     space: StateSpace
     planner: str
     seed: int
     time_limit: float  #: [s]
-    improve_for: float  #: [s], of planners that go on to better their route
+    improve_for: float  #: [s], time to keep improving after the first route
 
 
 class Attempt(NamedTuple):
-    """What came of a trial."""
+    """Result of a trial."""
 
-    seconds: float  #: until there was an answer, the costmap included [s]
-    betters: tuple[tuple[float, float], ...] = ()  #: (seconds, cost) of each better route
+    seconds: float  #: total time, the costmap included [s]
+    improvements: tuple[tuple[float, float], ...] = ()  #: (seconds, cost) of each better route
     reason: str = ""  #: why there is no route
 
     @property
     def solved(self) -> bool:
-        """Whether it brought a route."""
+        """Whether there is a route."""
         return not self.reason
 
     @property
     def first(self) -> float:
-        """When there was a route, as OMPL found it [s]."""
-        return self.betters[0][0]
+        """Time of OMPL's first route [s]."""
+        return self.improvements[0][0]
 
     @property
     def cost(self) -> float:
-        """Cost of the route that was handed out."""
-        return self.betters[-1][1]
+        """Cost of the returned route."""
+        return self.improvements[-1][1]
 
 
 def make_attempt(trial: Trial) -> Attempt:
-    """Return what comes of a trial; what it needs is made and compiled before its time begins."""
+    """Return the result of a trial; its time excludes compilation and building the map."""
     case = trial.work.cases()[trial.space]
     _warm_up(trial.planner, trial.space)
     return run_once(
@@ -91,18 +91,29 @@ def make_attempt(trial: Trial) -> Attempt:
 def run_once(
     case: Case, planner: str, space: StateSpace, *, seed: int, time_limit: float, improve_for: float
 ) -> Attempt:
-    """Plan once, and note each betterment as it comes."""
-    betters: list[tuple[float, float]] = []
+    """Plan once, and record time and cost of each improvement.
+
+    Parameters
+    ----------
+    case : Case
+    planner : str
+    space : StateSpace
+    seed : int
+    time_limit : float [s]
+    improve_for : float [s]
+        Time to keep improving after the first route.
+    """
+    improvements: list[tuple[float, float]] = []
     began = time.perf_counter()
 
-    def note(better: Improvement) -> None:
-        betters.append((time.perf_counter() - began, better.cost))
+    def record(improvement: Improvement) -> None:
+        improvements.append((time.perf_counter() - began, improvement.cost))
 
     try:
         plan(
             case.problem,
             planner,
-            on_improved=note,
+            on_improved=record,
             space=space,
             seed=seed,
             time_limit=time_limit,
@@ -112,19 +123,25 @@ def run_once(
     except (NoRouteError, AuditError) as error:
         reason = f"{type(error).__name__}: {error}"
         return Attempt(time.perf_counter() - began, reason=reason)
-    return Attempt(time.perf_counter() - began, tuple(betters))
+    return Attempt(time.perf_counter() - began, tuple(improvements))
 
 
 def lost_attempt(trial: Trial, reason: str) -> Attempt:
-    """Return what comes of a trial whose process ended."""
+    """Return the result of a trial whose process ended.
+
+    Parameters
+    ----------
+    trial : Trial
+    reason : str
+    """
     return Attempt(trial.time_limit, reason=reason)
 
 
 def shortest(case: Case) -> float | None:
-    """Return the length of the shortest route in "r2", as far as other planners know [m].
+    """Return the length of the shortest known route in "r2" [m], None without a route.
 
-    `polyanya` keeps to lines over free blocks of cells; pulled tight, its route keeps the disc's
-    exact distance. None where it finds no way.
+    It is the length of the route of `polyanya`, or of its shortcut, which can pass obstacles at
+    the exact radius of the disc.
     """
     try:
         route = plan(case.problem, "polyanya")
@@ -135,7 +152,7 @@ def shortest(case: Case) -> float | None:
 
 @cache
 def _warm_up(planner: str, space: StateSpace) -> None:
-    """Have all compiled and loaded that a planner needs in a space, once in a process."""
+    """Plan a simple problem, once per process, so that everything is compiled and loaded."""
     free = np.zeros((18, 18) if space != "r3" else (18, 18, 18), dtype=np.bool_)
     if space == "r3":
         grid = grid_of(BlockedVoxels(free, 0.5, (0.0, 0.0, 0.0)))

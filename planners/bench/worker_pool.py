@@ -1,4 +1,4 @@
-"""Work done by processes: one that crashes or hangs loses what it had in hand, and no more."""
+"""A pool of worker processes: a worker that crashes or hangs loses its current task only."""
 
 from __future__ import annotations
 
@@ -15,41 +15,41 @@ from typing import Any, Generic, TypeVar
 T = TypeVar("T")
 R = TypeVar("R")
 
-TICK = 1.0  # [s] between two looks at who is overdue
+CHECK_INTERVAL = 1.0  # [s] between two checks for overdue workers
 
 
 class _Worker(Generic[T, R]):
-    """One process, and what it has in hand."""
+    """A process and its current task."""
 
     task: T
     due: float
 
     def __init__(self, act: Callable[[T], R]) -> None:
         context = multiprocessing.get_context("spawn")
-        self.pipe, theirs = context.Pipe()
-        self.process = context.Process(target=_work, args=(theirs, act), daemon=True)
-        resource_tracker.ensure_running()  # its own start would let Ctrl-C through again
-        # Ctrl-C in a terminal is sent to all: it is for the process that the others work for.
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        self.pipe, child_pipe = context.Pipe()
+        self.process = context.Process(target=_work, args=(child_pipe, act), daemon=True)
+        resource_tracker.ensure_running()  # if started with the process, it would unblock SIGINT
+        # A terminal sends Ctrl-C to all processes of the group; only the main process handles it.
+        previous = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             self.process.start()
         finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        theirs.close()
+            signal.pthread_sigmask(signal.SIG_SETMASK, previous)
+        child_pipe.close()
 
-    def give(self, task: T, patience: float) -> None:
-        """Hand over a task."""
+    def send(self, task: T, patience: float) -> None:
+        """Send a task to the process."""
         self.task, self.due = task, time.monotonic() + patience
-        with suppress(OSError):  # it has ended, which its pipe tells whoever waits for it
+        with suppress(OSError):  # the process has ended: `wait` returns its pipe as ready
             self.pipe.send(task)
 
     @property
     def is_overdue(self) -> bool:
-        """Whether it has had its task for too long."""
+        """Whether the current task has taken longer than the patience."""
         return time.monotonic() >= self.due
 
-    def dismiss(self) -> None:
-        """End the process, whatever it does."""
+    def kill(self) -> None:
+        """Kill the process and release its resources."""
         self.process.kill()
         self.process.join()
         self.pipe.close()
@@ -63,57 +63,57 @@ def worker_pool(
     patience: float,
     lost: Callable[[T, str], R],
 ) -> Generator[tuple[T, R]]:
-    """Yield tasks with their results, as they come in.
+    """Yield tasks with their results, in the order in which they are completed.
 
     Parameters
     ----------
     tasks : iterable
-        Each can be pickled.
+        Each task can be pickled.
     act : callable
-        A function of a module, that other processes can import.
+        Function of a module that other processes can import; maps a task to its result.
     jobs : int
-        How many processes work at the same time.
+        Number of processes.
     patience : float [s]
-        A process that takes longer over a task is ended.
+        A process that takes longer for a task is killed.
     lost : callable
-        Makes the result of a task whose process ended, of the task and what happened.
+        Returns the result of a task whose process ended or was killed, from the task and a reason.
     """
-    left = deque(tasks)
-    hands: list[_Worker[T, R]] = []
+    pending = deque(tasks)
+    workers: list[_Worker[T, R]] = []
     try:
-        while left or hands:
-            while left and len(hands) < jobs:
-                hands.append(_Worker(act))
-                hands[-1].give(left.popleft(), patience)
-            ready = wait([hand.pipe for hand in hands], timeout=TICK)
-            for hand in [hand for hand in hands if hand.pipe in ready or hand.is_overdue]:
-                task = hand.task
-                result, fit = _result(hand, lost, patience)
-                if fit and left:
-                    hand.give(left.popleft(), patience)
+        while pending or workers:
+            while pending and len(workers) < jobs:
+                workers.append(_Worker(act))
+                workers[-1].send(pending.popleft(), patience)
+            ready = wait([worker.pipe for worker in workers], timeout=CHECK_INTERVAL)
+            for worker in [one for one in workers if one.pipe in ready or one.is_overdue]:
+                task = worker.task
+                result, alive = _receive(worker, lost, patience)
+                if alive and pending:
+                    worker.send(pending.popleft(), patience)
                 else:
-                    hands.remove(hand)
-                    hand.dismiss()
+                    workers.remove(worker)
+                    worker.kill()
                 yield task, result
     finally:
-        for hand in hands:
-            hand.dismiss()
+        for worker in workers:
+            worker.kill()
 
 
-def _result(hand: _Worker[T, R], lost: Callable[[T, str], R], patience: float) -> tuple[R, bool]:
-    """Return the result of what a process has in hand, and whether it can go on."""
-    if not hand.pipe.poll():
-        return lost(hand.task, f"its process did not end within {patience:g} s"), False
+def _receive(worker: _Worker[T, R], lost: Callable[[T, str], R], patience: float) -> tuple[R, bool]:
+    """Return the result of a worker's task, and whether the worker can take another task."""
+    if not worker.pipe.poll():
+        return lost(worker.task, f"its process did not end within {patience:g} s"), False
     try:
-        result: R = hand.pipe.recv()
-    except (EOFError, OSError):  # the latter if it ended before it read its task
-        hand.process.join()
-        return lost(hand.task, f"its process ended with {hand.process.exitcode}"), False
+        result: R = worker.pipe.recv()
+    except (EOFError, OSError):  # OSError: the process ended before it read its task
+        worker.process.join()
+        return lost(worker.task, f"its process ended with {worker.process.exitcode}"), False
     return result, True
 
 
 def _work(pipe: Connection[Any, Any], act: Callable[[Any], Any]) -> None:
-    """Do one task after another, until nobody is there who gives any."""
+    """Work on one task after another until the pipe is closed."""
     while True:
         try:
             task = pipe.recv()

@@ -1,4 +1,4 @@
-"""All commands of ``groundmap``, and what their exceptions become: a sentence, an exit code."""
+"""All commands of ``groundmap``, and the message and exit code of each exception."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typer.exceptions import TyperException
 from groundmap.errors import GroundmapError
 from groundmap.printable import printable
 from planners.commands.bench import bench_app
-from planners.commands.console import say
+from planners.commands.console import print_message
 from planners.commands.convert import convert_command
 from planners.commands.demo import demo_command
 from planners.commands.evaluate import evaluate_command
@@ -29,13 +29,13 @@ DONE, MISSED, BAD_INPUT, NO_ROUTE, INTERRUPTED = 0, 1, 2, 3, 130
 app = typer.Typer(
     name="groundmap",
     add_completion=False,
-    rich_markup_mode=None,  # it would take the units, such as [m], for markup
+    rich_markup_mode=None,  # rich would read units such as [m] as markup
     pretty_exceptions_enable=False,
 )
 
 
-def _print_version(asked: bool) -> None:
-    if asked:
+def _print_version(requested: bool) -> None:
+    if requested:
         print(f"groundmap {version('groundmap')}")
         raise typer.Exit
 
@@ -49,7 +49,7 @@ def _root(
         ),
     ] = False,
 ) -> None:
-    """From sparse stereo features to a map one can plan on. Metres, radians, seconds."""
+    """Map sparse stereo features and plan routes on the map. Units: metres, radians, seconds."""
 
 
 app.command("demo")(demo_command)
@@ -64,7 +64,7 @@ app.add_typer(bench_app)
 
 
 def run(argv: Sequence[str]) -> int:
-    """Run a command and return its exit code: one sentence on stderr where something is wrong.
+    """Run a command and return its exit code; an error is reported by one sentence on stderr.
 
     Raises
     ------
@@ -74,24 +74,24 @@ def run(argv: Sequence[str]) -> int:
     try:
         code = app(argv or ["--help"], standalone_mode=False) or DONE
     except NoRouteError as error:
-        return _refuse(error, str(error), NO_ROUTE, argv)
+        return _report(error, str(error), NO_ROUTE, argv)
     except AuditError as error:
-        return _refuse(error, f"{error} This is a bug: please report it.", MISSED, argv)
+        return _report(error, f"{error} This is a bug: please report it.", MISSED, argv)
     except (GroundmapError, PlanningError, OSError) as error:
-        return _refuse(error, str(error), BAD_INPUT, argv)
+        return _report(error, str(error), BAD_INPUT, argv)
     except TyperException as error:
-        return _refuse(error, error.format_message(), BAD_INPUT, argv)
+        return _report(error, error.format_message(), BAD_INPUT, argv)
     except typer.Abort as error:
         raise KeyboardInterrupt from error
-    if code == INTERRUPTED:  # typer has turned the key into an exit code
+    if code == INTERRUPTED:  # typer replaces KeyboardInterrupt by this exit code
         raise KeyboardInterrupt
     return int(code)
 
 
-def _refuse(error: Exception, reason: str, code: int, argv: Sequence[str]) -> int:
-    """Say why, in a sentence on stderr, and as JSON on stdout where that was asked for."""
+def _report(error: Exception, reason: str, code: int, argv: Sequence[str]) -> int:
+    """Print the reason on stderr, with ``--json`` also as JSON on stdout; return the code."""
     reason = printable(reason, lines=True)
-    say(f"groundmap: {reason}")
+    print_message(f"groundmap: {reason}")
     if "--json" in argv:
         print(json.dumps({"error": type(error).__name__, "reason": reason}))
     return code

@@ -1,4 +1,4 @@
-"""``groundmap bench motions``: compiled checks of motions against a Python lambda per state."""
+"""``groundmap bench motions``: compiled motion validation against a Python lambda per state."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from groundmap.io.map_images import BlockedMap, grid_of
 from groundmap.io.movingai_scen import MovingAIQuery
 from planners.bench.motions import compare_motions
 from planners.bench.movingai import find_workloads, read_map
-from planners.commands.console import JsonOption, emit, emit_rows, patiently
+from planners.commands.console import JsonOption, emit, emit_rows, show_waiting
 from planners.commands.options import outline
 from planners.errors import ProblemError
 from planners.problem.problem import Pose
@@ -20,31 +20,32 @@ from planners.problem.problem import Pose
 
 def motions_command(
     scen: Annotated[
-        Path, typer.Argument(metavar="SCEN", help="Queries of the MovingAI benchmark: a .scen.")
+        Path, typer.Argument(metavar="SCEN", help="Queries of the MovingAI benchmark: .scen.")
     ],
     footprint: Annotated[
         str,
         typer.Option(
             metavar="R | 'X,Y X,Y X,Y ...'",
-            help="Radius [m, a cell's side is one] for r2, or corners [m, base_link] for se2.",
+            help="Radius [m] for r2, or corners [m, base_link] for se2; the side of a cell is 1 m.",
         ),
     ] = "0",
-    queries: Annotated[int, typer.Option(min=1, help="Evenly spread over the file.")] = 5,
-    seeds: Annotated[int, typer.Option(min=1, help="Searches for each query and check.")] = 3,
-    time_limit: Annotated[float, typer.Option(min=0.1, help="Of a search [s].")] = 10.0,
+    queries: Annotated[
+        int, typer.Option(min=1, help="Number of queries, evenly spaced in the file.")
+    ] = 5,
+    seeds: Annotated[int, typer.Option(min=1, help="Searches per query and check.")] = 3,
+    time_limit: Annotated[float, typer.Option(min=0.1, help="Time limit of a search [s].")] = 10.0,
     as_json: JsonOption = False,
 ) -> None:
-    """Check what RRT-Connect asks for, by a compiled call or a Python lambda for each cell."""
+    """Check the motions of RRT-Connect by a compiled call and by a Python lambda per state."""
     (work, *_) = find_workloads(scen, limit=queries)
-    found = read_map(work)
-    if not isinstance(found, BlockedMap):
+    blocked_map = read_map(work)
+    if not isinstance(blocked_map, BlockedMap):
         raise ProblemError("SCEN", "queries on a 2-D map", str(scen))
-    asked = [_ends(query) for query in work.queries]
-    with patiently("searching by both checks"):
+    with show_waiting("searching with both checks"):
         rows = compare_motions(
-            grid_of(found),
+            grid_of(blocked_map),
             footprint=outline(footprint),
-            queries=asked,
+            queries=[_ends(query) for query in work.queries],
             seeds=seeds,
             time_limit=time_limit,
         )
@@ -60,7 +61,7 @@ def _figures(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def _ends(query: MovingAIQuery) -> tuple[Pose, Pose]:
-    """Return start and goal, at the centres of their cells, both looking from one to the other."""
+    """Return start and goal at the centres of their cells, headed from the start to the goal."""
     start, goal = ((col + 0.5, row + 0.5) for row, col in (query.start, query.goal))
     yaw = math.atan2(goal[1] - start[1], goal[0] - start[0])
     return (*start, yaw), (*goal, yaw)

@@ -1,4 +1,4 @@
-"""``groundmap bench planning --samplers``: OMPL's planners side by side."""
+"""``groundmap bench planning --samplers``: a comparison of OMPL's planners."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from planners.sampling.ompl_module import samplers
 COLUMNS = ("solved", "first_ms", "first_p95_ms", "median_ms", "cost", "ratio")
 
 
-class Entry(NamedTuple):
-    """What the command line asks for; an empty list is all."""
+class SamplerOptions(NamedTuple):
+    """Options of the command line; an empty list stands for all."""
 
     workloads: list[str]
     maps: list[Path]
@@ -40,77 +40,80 @@ class Entry(NamedTuple):
     plot: Path | None
 
 
-def race_samplers(entry: Entry, *, as_json: bool) -> None:
-    """Run all that was entered; print figures, and draw costs over time."""
+def compare_samplers(options: SamplerOptions, *, as_json: bool) -> None:
+    """Run all trials, print their figures, and draw costs over time."""
     began = time.perf_counter()
-    if entry.plot is not None:
-        check_picture(entry.plot, sources=entry.maps)
-    names = _known("planner", entry.planners, _samplers())
-    spaces = [space for space in SPACES if space in _known("space", entry.spaces, SPACES)]
-    works = _works(entry)
+    if options.plot is not None:
+        check_picture(options.plot, sources=options.maps)
+    names = _select("planner", options.planners, _samplers())
+    spaces = [space for space in SPACES if space in _select("space", options.spaces, SPACES)]
+    works = _workloads(options)
     trials, refused = list_trials(
         works,
         names,
         spaces,
-        seeds=entry.seeds,
-        time_limit=entry.time_limit,
-        improve_for=entry.improve_for,
+        seeds=options.seeds,
+        time_limit=options.time_limit,
+        improve_for=options.improve_for,
     )
 
     def watch(steps: Iterable[Any]) -> Iterable[Any]:
         return show_progress(steps, total=len(trials), what="attempts")
 
-    races = run(trials, jobs=entry.jobs or processors(), watch=watch)
+    races = run(trials, jobs=options.jobs or processors(), watch=watch)
     best = optima(works, races)
     rows = [row(race, best[race.work, race.space]) for race in races]
-    if entry.plot is not None and rows:
-        save_figure(_figure(rows), entry.plot)
+    if options.plot is not None and rows:
+        save_figure(_figure(rows), options.plot)
     seconds = time.perf_counter() - began
     if as_json:
-        told = {key: getattr(entry, key) for key in ("seeds", "time_limit", "improve_for")}
+        given = {key: getattr(options, key) for key in ("seeds", "time_limit", "improve_for")}
         left_out = [one._asdict() for one in refused]
-        result = {**told, "seconds": seconds, "rows": rows, "refused": left_out}
+        result = {**given, "seconds": seconds, "rows": rows, "refused": left_out}
         emit(result, as_json=True, title="")
     else:
         _print(rows, refused, seconds)
 
 
 def _samplers() -> list[str]:
-    found = sorted(samplers())
-    if not found:
-        get_planner("rrtconnect")  # says how to install them
-    return found
+    names = sorted(samplers())
+    if not names:
+        get_planner("rrtconnect")  # raises, and explains how to install ompl
+    return names
 
 
-def _known(option: str, asked: Sequence[str], known: Sequence[str]) -> list[str]:
-    """Return what was asked for, or all; each of it must be known."""
-    for one in asked:
-        if one not in known:
-            raise ProblemError(option, f"one of {', '.join(known)}", repr(one))
-    return list(dict.fromkeys(asked)) or list(known)
+def _select(option: str, values: Sequence[str], known: Sequence[str]) -> list[str]:
+    """Return the values of an option, each of them known; without values, all that are known."""
+    for value in values:
+        if value not in known:
+            raise ProblemError(option, f"one of {', '.join(known)}", repr(value))
+    return list(dict.fromkeys(values)) or list(known)
 
 
-def _works(entry: Entry) -> list[Workload]:
-    """Return the workloads: those of ours, unless only maps were asked for."""
-    footprint: Any = CART if entry.footprint is None else outline(entry.footprint)
-    Footprint.of(footprint)  # refuses what is none before anything runs
+def _workloads(options: SamplerOptions) -> list[Workload]:
+    """Return the built-in workloads, the given maps, or both if both are selected."""
+    footprint: Any = CART if options.footprint is None else outline(options.footprint)
+    Footprint.of(footprint)  # an invalid footprint is refused before anything runs
     if isinstance(footprint, list):
         footprint = tuple(footprint)
-    ours = [Workload(name) for name in _known("workload", entry.workloads, list(WORKLOADS))]
-    asked = {file: path for path in entry.maps for file in find_maps(path)}
-    counts = Counter(_title(file, path) for file, path in asked.items())
-    titles = {file: _title(file, path) for file, path in asked.items()}
+    names = _select("workload", options.workloads, list(WORKLOADS))
+    built_in = [Workload(name) for name in names]
+    titles = {file: _title(file, path) for path in options.maps for file in find_maps(path)}
+    counts = Counter(titles.values())
     maps = [
         Workload(
-            title if counts[title] == 1 else file.as_posix(), file, footprint, entry.turning_radius
+            title if counts[title] == 1 else file.as_posix(),
+            file,
+            footprint,
+            options.turning_radius,
         )
         for file, title in titles.items()
     ]
-    return maps if maps and not entry.workloads else ours + maps
+    return maps if maps and not options.workloads else built_in + maps
 
 
-def _title(file: Path, asked: Path) -> str:
-    return file.name if file == asked else file.relative_to(asked).as_posix()
+def _title(file: Path, given: Path) -> str:
+    return file.name if file == given else file.relative_to(given).as_posix()
 
 
 def _groups(rows: list[dict[str, Any]]) -> dict[tuple[str, str], list[dict[str, Any]]]:
@@ -122,7 +125,7 @@ def _groups(rows: list[dict[str, Any]]) -> dict[tuple[str, str], list[dict[str, 
 
 
 def _figure(rows: list[dict[str, Any]]) -> Any:
-    """Return a picture with a row of panels for each workload."""
+    """Return a figure with a row of panels for each workload."""
     groups = _groups(rows)
     panels = [
         Panel(
@@ -131,23 +134,23 @@ def _figure(rows: list[dict[str, Any]]) -> Any:
                 one["system"]: Progress(one["curve"], one["solved"], one["queries"])
                 for one in group
             },
-            note=_against(group[0]),
+            note=_optimum(group[0]),
         )
         for (work, space), group in groups.items()
     ]
     return anytime_figure(panels, columns=len({space for _, space in groups}))
 
 
-def _against(one: dict[str, Any]) -> str:
-    """Return what a row's costs are held against."""
+def _optimum(one: dict[str, Any]) -> str:
+    """Return the optimum of a row, which its costs are compared with."""
     if one["optimum"] is None:
-        return "nobody found a route"
+        return "no planner found a route"
     kind = "best known" if one["best_known"] else "shortest"
     return f"{kind}: {one['optimum']:.2f} m"
 
 
 def _print(rows: list[dict[str, Any]], refused: list[Refused], seconds: float) -> None:
-    """Print a table for each workload and space, what is refused, and who failed why."""
+    """Print a table for each workload and space, with reasons of failures and refusals."""
     for (work, space), group in _groups(rows).items():
         shown = {
             one["system"]: {
@@ -156,7 +159,8 @@ def _print(rows: list[dict[str, Any]], refused: list[Refused], seconds: float) -
             }
             for one in group
         }
-        emit_rows(shown, title=f"{work}, {space} ({_against(group[0])})")
+        emit_rows(shown, title=f"{work}, {space} ({_optimum(group[0])})")
+
         for one in group:
             if one["reason"] is not None:
                 print(f"  {one['system']}: {one['reason']}")

@@ -1,4 +1,4 @@
-"""What every command does with its results, its progress and its time."""
+"""Results, messages and progress on the console, as all commands print them."""
 
 from __future__ import annotations
 
@@ -15,84 +15,88 @@ from typing import Annotated, Any, TypeVar
 import typer
 from rich.console import Console
 from rich.progress import track
+from rich.table import Table
 
 from groundmap.printable import printable
 
 T = TypeVar("T")
 
-# Not in the table for people: of a route, these are in its file; warnings are on stderr.
+# Left out of the printed table: a route's file holds the first two, stderr shows the warnings.
 LISTS = ("waypoints", "headings", "warnings")
-SAY_EVERY = 2.0  # [s], between two lines of progress where there is no terminal
+PROGRESS_INTERVAL = 2.0  # [s], between two lines of progress without a terminal
+TABLE_WIDTH = 100_000  # characters: wider than any table, so that no cell is wrapped or cut
 
 JsonOption = Annotated[
-    bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else there.")
+    bool, typer.Option("--json", help="Print one JSON object, and nothing else, on stdout.")
 ]
 
 
 def emit(result: Mapping[str, Any], *, as_json: bool, title: str) -> None:
-    """Print a result on stdout: one JSON object, or a table for people."""
+    """Print a result on stdout: one JSON object, or a title and a table of names and values."""
     if as_json:
         print(json.dumps(result))
         return
-    shown = {name.replace("_", " "): _format(result[name]) for name in result if name not in LISTS}
-    width = max(map(len, shown))
-    rows = (f"  {name:<{width}}  {value}" for name, value in shown.items())
-    print(printable(title), *map(printable, rows), sep="\n")
-
-
-def emit_columns(columns: Mapping[str, Mapping[str, Any]], *, title: str) -> None:
-    """Print results side by side for people: a column for each, a row for each of their keys."""
-    keys = list(next(iter(columns.values())))
-    width = max(map(len, keys))
-    print(printable(title))
-    print(" " * width, *(f"{name:>10}" for name in columns), sep="  ")
-    for key in keys:
-        cells = (f"{_format(column[key]):>10}" for column in columns.values())
-        print(f"{key.replace('_', ' '):<{width}}", *cells, sep="  ")
+    table = _new_table(show_header=False)
+    for name, value in result.items():
+        if name not in LISTS:
+            table.add_row(_words(name), printable(_format(value)))
+    print(printable(title), *format_table(table), sep="\n")
 
 
 def emit_rows(rows: Mapping[str, Mapping[str, Any]], *, title: str) -> None:
-    """Print results for people: a row for each, a column for each of their keys."""
+    """Print a title and a table: one row per item of `rows`, one column per key of an item."""
     keys = list(next(iter(rows.values())))
-    heads = [key.replace("_", " ") for key in keys]
-    cells = {name: [_format(row[key]) for key in keys] for name, row in rows.items()}
-    first = max(map(len, cells))
-    widths = [
-        max(len(head), *(len(row[i]) for row in cells.values())) for i, head in enumerate(heads)
-    ]
-    print(printable(title))
-    for name, row in {"": heads, **cells}.items():
-        padded = (f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))
-        print(f"  {name:<{first}}", *padded, sep="  ")
+    table = _new_table()
+    table.add_column("")
+    for key in keys:
+        table.add_column(_words(key), justify="right")
+    for name, row in rows.items():
+        table.add_row(printable(name), *(_format(row[key]) for key in keys))
+    print(printable(title), *format_table(table), sep="\n")
 
 
-def say(message: str) -> None:
+def emit_columns(columns: Mapping[str, Mapping[str, Any]], *, title: str) -> None:
+    """Print a title and a table: one column per item of `columns`, one row per key of an item."""
+    keys = list(next(iter(columns.values())))
+    rows = {_words(key): {name: column[key] for name, column in columns.items()} for key in keys}
+    emit_rows(rows, title=title)
+
+
+def format_table(table: Table) -> list[str]:
+    """Return the lines of a table, as wide as its cells and without trailing spaces."""
+    console = Console(width=TABLE_WIDTH, markup=False, highlight=False, emoji=False)
+    with console.capture() as captured:
+        console.print(table)
+    return [line.rstrip() for line in captured.get().splitlines()]
+
+
+def print_message(message: str) -> None:
     """Print a message on stderr."""
     print(printable(message, lines=True), file=sys.stderr)
 
 
 def show_progress(items: Iterable[T], *, total: int, what: str) -> Iterator[T]:
-    """Yield `items` with a progress bar on stderr, or a line now and then without a terminal."""
+    """Yield `items` and show progress on stderr: a bar, or a line every 2 s without a terminal."""
     console = Console(stderr=True)
     if console.is_terminal:
         yield from track(items, total=total, description=what, console=console, transient=True)
         return
-    spoke = time.monotonic()
+    printed = time.monotonic()
     for number, item in enumerate(items, start=1):
         yield item
-        if time.monotonic() - spoke > SAY_EVERY:
-            say(f"{what}: {number} of {total}")
-            spoke = time.monotonic()
+        if time.monotonic() - printed > PROGRESS_INTERVAL:
+            print_message(f"{what}: {number} of {total}")
+            printed = time.monotonic()
 
 
 @contextmanager
-def patiently(what: str, *, every: float = SAY_EVERY) -> Iterator[None]:
-    """Say on stderr, each so many seconds, that something still goes on."""
+def show_waiting(what: str, *, every: float = PROGRESS_INTERVAL) -> Iterator[None]:
+    """Print a line on stderr every few seconds [s] while the body of ``with`` runs."""
     over = threading.Event()
 
     def remind() -> None:
         while not over.wait(every):
-            say(f"{what} ...")
+            print_message(f"{what} ...")
 
     reminder = threading.Thread(target=remind, daemon=True)
     reminder.start()
@@ -104,13 +108,13 @@ def patiently(what: str, *, every: float = SAY_EVERY) -> Iterator[None]:
 
 
 def seconds_since_start() -> float:
-    """Return how long this process has run: starting Python and loading libraries takes time."""
+    """Return the age of this process [s]; it includes the start of Python and all imports."""
     try:
         ticks = int(Path("/proc/self/stat").read_text().rpartition(")")[2].split()[19])
         started = ticks / os.sysconf("SC_CLK_TCK")
         return time.clock_gettime(time.CLOCK_BOOTTIME) - started
     except (OSError, AttributeError, ValueError, IndexError):
-        return time.process_time()  # elsewhere: the time on the processor, which is nearly it
+        return time.process_time()  # without /proc: the processor time, which is slightly less
 
 
 def numbers(name: str, text: str, *lengths: int) -> tuple[float, ...]:
@@ -119,18 +123,27 @@ def numbers(name: str, text: str, *lengths: int) -> tuple[float, ...]:
     Raises
     ------
     typer.BadParameter
-        Not numbers, or another count of them than `lengths` allows.
+        Not numbers, or a count of numbers that is not one of `lengths`.
     """
     try:
         values = tuple(float(part) for part in text.split(","))
     except ValueError:
         values = ()
     if len(values) not in lengths:
-        wanted = " or ".join(str(length) for length in lengths)
+        expected = " or ".join(str(length) for length in lengths)
         raise typer.BadParameter(
-            f"expected {wanted} numbers with commas between, got {text!r}", param_hint=f"--{name}"
+            f"expected {expected} numbers separated by commas, got {text!r}",
+            param_hint=f"--{name}",
         )
     return values
+
+
+def _new_table(*, show_header: bool = True) -> Table:
+    return Table(box=None, padding=(0, 0, 0, 2), show_header=show_header)
+
+
+def _words(name: str) -> str:
+    return printable(name.replace("_", " "))
 
 
 def _format(value: Any) -> str:

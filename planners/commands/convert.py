@@ -1,4 +1,4 @@
-"""``groundmap convert``: a map for other programs."""
+"""``groundmap convert``: export a map for other programs."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ def convert_command(
     ],
     out: Annotated[
         Path,
-        typer.Argument(help=".npz: dense arrays; .yaml: Nav2's map_server (with a .pgm beside)."),
+        typer.Argument(help=".npz: dense arrays; .yaml and .pgm: a map of Nav2's map_server."),
     ],
     bounds: Annotated[
         str | None,
         typer.Option(
             metavar="XMIN,YMIN,XMAX,YMAX",
-            help="Part to write [m], of a 3-D map with ZMIN and ZMAX; all unless told.",
+            help="Part to write [m], for a 3-D map with ZMIN and ZMAX; default: all.",
         ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Write a map in another program's form."""
+    """Convert a map to the format of another program."""
     sources = files_of(map_file)
     for file in files_written(out):
         check_writable(file, sources=sources)

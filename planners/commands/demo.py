@@ -1,4 +1,4 @@
-"""``groundmap demo``: the whole way, from a recorded courtyard to a route through its doorway."""
+"""``groundmap demo``: map the bundled log of a courtyard and plan a route through its doorway."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def demo_command(
     ),
     as_json: JsonOption = False,
 ) -> None:
-    """Map a log that comes along, plan a route on the map, draw both."""
+    """Map the bundled sample log, plan a route on the map, draw both."""
     _check_folder(out)
     mapper = map_courtyard()
     start = mapper.grid.trajectory[0, :2]
@@ -49,7 +49,7 @@ def demo_command(
 
 
 def map_courtyard() -> GroundMapper:
-    """Return a mapper that has seen the log that comes along."""
+    """Return a mapper with all views of the bundled sample log."""
     mapper = GroundMapper()
     with as_file(files("planners") / "demo_data") as folder:
         log = read_views(folder)
@@ -59,8 +59,8 @@ def map_courtyard() -> GroundMapper:
 
 
 def _check_folder(out: Path) -> None:
-    """Check that the files can be written, the folder made where there is none."""
-    if os.path.isfile(out):  # unlike Path's, these raise at no name
+    """Check that the files can be written, or that a new folder can be created."""
+    if os.path.isfile(out):  # unlike Path's methods, os.path's accept any name without an error
         raise FileFormatError(out, "a folder, or the name of a new one", "a file")
     if not os.path.isdir(out):
         check_writable(out)
@@ -86,7 +86,7 @@ def _summary(mapper: GroundMapper, route: Route, out: Path) -> dict[str, Any]:
 
 
 def _next_commands(out: Path, route: Route) -> list[str]:
-    """Return commands that go on from here, ready to be pasted."""
+    """Return commands to try next, quoted for a shell."""
     folder = out.as_posix()
     grid, line, doorway = (shlex.quote(f"{folder}/{name}") for name in (MAP, ROUTE, "doorway.png"))
     back, start = ("{:g},{:g}".format(*route.waypoints[end]) for end in (-1, 0))

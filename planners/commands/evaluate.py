@@ -1,4 +1,4 @@
-"""``groundmap evaluate``: how good the map of a log is, by features that it never saw."""
+"""``groundmap evaluate``: judge the map of a log by features that were held out of it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from planners.commands.settings_file import ConfigOption, read_settings
 def evaluate_command(
     source: Annotated[Path, typer.Argument(help="Folder with a log of views.")],
     poses: Annotated[
-        Path | None, typer.Option(help="File with other poses: TUM rows, or id + 16 numbers.")
+        Path | None,
+        typer.Option(help="File with poses to use instead: TUM rows, or id + 16 numbers."),
     ] = None,
     plot: Annotated[
         Path | None, typer.Option(help="Draw the map and the held-out features: .png, .pdf, .svg.")
@@ -29,7 +30,7 @@ def evaluate_command(
     config: ConfigOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Judge maps of a log by the features held out of them; shares, 0 to 1."""
+    """Judge maps of a log by features held out of them; figures are shares from 0 to 1."""
     if plot is not None:
         draw.check_picture(plot)
     log = read_views(source, poses=poses)

@@ -1,4 +1,4 @@
-"""``groundmap info``: what a map file holds."""
+"""``groundmap info``: the contents of a map file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def info_command(
     ],
     as_json: JsonOption = False,
 ) -> None:
-    """Tell what a map file holds: areas [m²], bounds [m], rule, poses."""
+    """Summarise a map file: areas [m²], bounds [m], update rule, poses."""
     grid = load_map(map_file)
     poses = grid.trajectory
     extent, unit = ("area", "m2") if grid.ndim == 2 else ("volume", "m3")

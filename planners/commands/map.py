@@ -1,7 +1,8 @@
-"""``groundmap map``: from a log of views to a map."""
+"""``groundmap map``: fuse a log of views into a map."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,44 +16,54 @@ from groundmap.mapper import warm_up
 from groundmap.stopwatch import Stopwatch
 from groundmap.view.diagnosis import SAMPLE, describe_dropped, likely_mistakes
 from groundmap.view.jumps import Jump
-from planners.commands.console import JsonOption, emit, say, seconds_since_start, show_progress
+from planners.commands.console import (
+    JsonOption,
+    emit,
+    print_message,
+    seconds_since_start,
+    show_progress,
+)
 from planners.commands.settings_file import ConfigOption, read_settings
 
-SHOWN_JUMPS = 5  # of the poses, one line each
+SHOWN_JUMPS = 5  # jumps of the poses, one warning each
 NOT_MAPPING = {"startup", "read", "compile", "save", "other"}
 
 
 def map_command(
     source: Annotated[Path, typer.Argument(help="Folder with a log of views.")],
-    out: Annotated[Path, typer.Option(help="File to write the map to.")],
+    out: Annotated[Path, typer.Option(help="File of the map: .npz.")],
     poses: Annotated[
-        Path | None, typer.Option(help="File with other poses: TUM rows, or id + 16 numbers.")
+        Path | None,
+        typer.Option(help="File with poses to use instead: TUM rows, or id + 16 numbers."),
     ] = None,
     format: Annotated[
-        str | None, typer.Option(help="Format of the log; recognised unless told.")
+        str | None, typer.Option(help="Format of the log; default: detected from its files.")
     ] = None,
     resolution: Annotated[
-        float | None, typer.Option(help="Size of a cell [m]; 0.1524 unless told.")
+        float | None, typer.Option(help="Side of a cell [m]; default: 0.1524 m.")
     ] = None,
     uncertainty: Annotated[
-        str | None, typer.Option(help="Spread of surfaces: ellipsoid (default), radius, none.")
+        str | None,
+        typer.Option(
+            help="Uncertainty of surfaces: ellipsoid, radius or none; default: ellipsoid."
+        ),
     ] = None,
     fusion: Annotated[
-        str | None, typer.Option(help="Update rule: average (default), capped.")
+        str | None, typer.Option(help="Update rule: average or capped; default: average.")
     ] = None,
     max_range: Annotated[
-        float | None, typer.Option(help="Drop farther features [m]; 20 unless told.")
+        float | None, typer.Option(help="Drop farther features [m]; default: 20 m.")
     ] = None,
     camera_height: Annotated[
         float | None,
-        typer.Option(help="Height of the camera above level ground [m]; fitted unless told."),
+        typer.Option(help="Height of the camera above level ground [m]; default: fitted."),
     ] = None,
     config: ConfigOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Map a log of views into a confidence grid."""
-    stages = Stopwatch(outside="other")
-    stages.seconds["startup"] = seconds_since_start()
+    stopwatch = Stopwatch(outside="other")
+    stopwatch.seconds["startup"] = seconds_since_start()
     check_writable(out)
     tables = read_settings(config)
     given = {
@@ -61,37 +72,44 @@ def map_command(
         "fusion": fusion,
         "max_range": max_range,
     }
-    chosen = tables["mapper"] | {key: value for key, value in given.items() if value is not None}
-    mapper = GroundMapper(stages=stages, **chosen)
-    with stages.measure("compile"):
+    settings = tables["mapper"] | {key: value for key, value in given.items() if value is not None}
+    mapper = GroundMapper(stages=stopwatch, **settings)
+    with stopwatch.measure("compile"):
         warm_up(mapper.settings)
-    with stages.measure("read"):
+    with stopwatch.measure("read"):
         log = read_views(source, format=format, poses=poses)
         total = len(log)
     if total == 0:
         raise InputError(str(source), "at least one view", "none")
-    views = fit_ground(stages.each("read", log), camera_height=camera_height, **tables["ground"])
-    sample: list[View] = []
-    positions: list[Floats] = []
-    times: list[float | None] = []
-    for view in show_progress(stages.each("ground", views), total=total, what="mapping views"):
-        mapper.integrate(view)
-        positions.append(view.T_map_base[:3, 3])
-        times.append(view.timestamp)
-        if len(sample) < SAMPLE:
-            sample.append(view)
-    jumps = _jumps(positions, times)
+    views = fit_ground(stopwatch.each("read", log), camera_height=camera_height, **tables["ground"])
+    timed = stopwatch.each("ground", views)
+    sample, jumps = _integrate(mapper, show_progress(timed, total=total, what="mapping views"))
     warnings = _warnings(mapper, sample) + _jump_warnings(jumps)
     for warning in warnings:
-        say(f"warning: {warning}")
-    with stages.measure("save"):
+        print_message(f"warning: {warning}")
+    with stopwatch.measure("save"):
         mapper.grid.save(out)
-    summary = _summary(mapper, jumps, stages, out) | {"warnings": warnings}
+    summary = _summary(mapper, jumps, stopwatch, out) | {"warnings": warnings}
     emit(summary, as_json=as_json, title=f"map of {source}")
 
 
+def _integrate(mapper: GroundMapper, views: Iterable[View]) -> tuple[list[View], list[Jump]]:
+    """Map all views; return the first ones, as a sample of the log, and the jumps of the poses."""
+    sample: list[View] = []
+    positions: list[Floats] = []
+    times: list[float] = []
+    for view in views:
+        mapper.integrate(view)
+        positions.append(view.T_map_base[:3, 3])
+        if view.timestamp is not None:
+            times.append(view.timestamp)
+        if len(sample) < SAMPLE:
+            sample.append(view)
+    return sample, pose_jumps(positions, times if len(times) == len(positions) else None)
+
+
 def _warnings(mapper: GroundMapper, sample: list[View]) -> list[str]:
-    """Return what is likely wrong with a log, or with its map."""
+    """Return warnings of likely mistakes in a log, and of a map without freespace."""
     warnings = likely_mistakes(sample)
     if mapper.grid.area(CellState.FREE) == 0:
         stats = mapper.stats
@@ -106,18 +124,12 @@ def _warnings(mapper: GroundMapper, sample: list[View]) -> list[str]:
     return warnings
 
 
-def _jumps(positions: list[Floats], times: list[float | None]) -> list[Jump]:
-    """Return the jumps of the poses."""
-    known = [time for time in times if time is not None]
-    return pose_jumps(positions, known if len(known) == len(times) else None)
-
-
 def _jump_warnings(jumps: list[Jump]) -> list[str]:
     """Return a warning for each of the first jumps of the poses."""
     warnings = [
         f"the pose of view {jump.view} is {jump.step:.4g} m from that of view {jump.view - 1}, "
-        f"where steps are {jump.typical_step:.2g} m: is one of them wrong? What is seen from a "
-        "wrong pose lies at a wrong place in the map."
+        f"where steps are {jump.typical_step:.2g} m: is one of them wrong? A view with a wrong "
+        "pose is mapped at a wrong place."
         for jump in jumps[:SHOWN_JUMPS]
     ]
     if len(jumps) > SHOWN_JUMPS:
@@ -126,11 +138,11 @@ def _jump_warnings(jumps: list[Jump]) -> list[str]:
 
 
 def _summary(
-    mapper: GroundMapper, jumps: list[Jump], stages: Stopwatch, out: Path
+    mapper: GroundMapper, jumps: list[Jump], stopwatch: Stopwatch, out: Path
 ) -> dict[str, Any]:
     grid, stats = mapper.grid, mapper.stats
     area = {state: grid.area(state) for state in (CellState.FREE, CellState.NONFREE)}
-    seconds = stages.stop()
+    seconds = stopwatch.stop()
     mapping = sum(time for stage, time in seconds.items() if stage not in NOT_MAPPING)
     return {
         "views": stats.views,

@@ -1,4 +1,4 @@
-"""What options of the command line say, as values: outlines, settings."""
+"""Parsers of options that hold outlines and settings."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from planners.commands.console import numbers
 
 
 def outline(text: str) -> float | list[tuple[float, ...]]:
-    """Return a footprint: ``R`` is a radius [m], ``X,Y X,Y X,Y ...`` corners [m, base_link].
+    """Return a footprint: a radius for ``R`` [m], corners for ``X,Y X,Y ...`` [m, base_link].
 
     Raises
     ------
     typer.BadParameter
-        Neither.
+        Neither a number nor corners.
 
     Examples
     --------
@@ -35,7 +35,7 @@ def assignments(texts: list[str]) -> dict[str, Any]:
     Raises
     ------
     typer.BadParameter
-        No equals sign, a name that comes twice, or half a list.
+        No equals sign, a name given twice, or an invalid list.
 
     Examples
     --------
@@ -54,7 +54,7 @@ def assignments(texts: list[str]) -> dict[str, Any]:
 
 
 def _parse_list(text: str) -> Any:
-    """Return a list, as JSON has it."""
+    """Return a list in JSON."""
     try:
         return parse_json(text)
     except WrongDocumentError as error:

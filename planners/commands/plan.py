@@ -1,4 +1,4 @@
-"""``groundmap plan``: from a map to a route."""
+"""``groundmap plan``: plan a route on a map."""
 
 from __future__ import annotations
 
@@ -8,11 +8,19 @@ from typing import Annotated, cast
 import numpy as np
 import typer
 
+from groundmap import ConfidenceGrid
 from groundmap.draw import check_picture, known_bounds
 from groundmap.files.archive import check_writable
 from groundmap.io import files_of, load_map
 from groundmap.io.map_images import BlockedMap, grid_of
-from planners.commands.console import JsonOption, emit, emit_rows, numbers, patiently, show_progress
+from planners.commands.console import (
+    JsonOption,
+    emit,
+    emit_rows,
+    numbers,
+    show_progress,
+    show_waiting,
+)
 from planners.commands.options import assignments, outline
 from planners.commands.plot import check_flat, draw_map
 from planners.errors import NoRouteError, ProblemError
@@ -24,6 +32,7 @@ from planners.route.route import Route
 from planners.route.route_files import format_of
 from planners.route.shortcut import shortcut
 from planners.route.smooth import smooth
+from planners.search.graph import Graph
 
 ALL = "all"  # instead of a planner's name
 COLUMNS = ("length", "cost", "bound", "min_clearance", "mean_clearance", "min_confidence",
@@ -40,11 +49,14 @@ def plan_command(
         Path, typer.Argument(metavar="MAP", help="A map: .npz, .yaml (map_server), .map, .3dmap.")
     ],
     start: Annotated[
-        str, typer.Option(metavar="X,Y[,YAW]", help="Start [m, rad; map]; X,Y,Z on a 3-D map.")
+        str, typer.Option(metavar="X,Y[,YAW]", help="Start [m, rad; map]; on a 3-D map: X,Y,Z.")
     ],
     goal: Annotated[
         str,
-        typer.Option(metavar="X,Y[,YAW]", help="Goal, likewise; hybrid_astar needs both yaws."),
+        typer.Option(
+            metavar="X,Y[,YAW]",
+            help="Goal [m, rad; map]; on a 3-D map: X,Y,Z. hybrid_astar needs a yaw of both.",
+        ),
     ],
     footprint: Annotated[
         str,
@@ -56,15 +68,15 @@ def plan_command(
     planner: Annotated[
         str,
         typer.Option(
-            help=f"Planner: {', '.join(sorted(OWN_PLANNERS))}; or all, to compare them; or one of"
-            " OMPL's, such as rrtconnect, if ompl is installed."
+            help=f"Planner: {', '.join(sorted(OWN_PLANNERS))}; all, to compare these; or a planner"
+            " of OMPL such as rrtconnect, if ompl is installed."
         ),
     ] = "astar",
     out: Annotated[
-        Path | None, typer.Option(help="Write the route: .geojson, .csv, or .yaml (a ROS path).")
+        Path | None, typer.Option(help="File of the route: .geojson, .csv, or .yaml (ROS path).")
     ] = None,
     plot: Annotated[
-        Path | None, typer.Option(help="Draw map and route: .png, .pdf or .svg.")
+        Path | None, typer.Option(help="Picture of map and route: .png, .pdf or .svg.")
     ] = None,
     unknown: Annotated[
         str, typer.Option(help="Unknown and contested space: avoid, allow or penalise.")
@@ -72,62 +84,55 @@ def plan_command(
     clear_start: Annotated[
         bool,
         typer.Option(
-            help="Count unknown cells near the start as free: of a disc, within twice its radius."
-            " known_clearance is the route's distance to these, too."
+            help="Treat unknown cells near the start as free (for a disc, within twice its radius)."
+            " known_clearance is the distance of the route to these cells and to obstacles."
         ),
     ] = True,
     clearance_weight: Annotated[
-        float, typer.Option(help="Extra cost of a metre that just clears obstacles [m/m].")
+        float, typer.Option(help="Extra cost per metre of a route that touches obstacles [m/m].")
     ] = PLAIN.clearance_weight,
     inflation_radius: Annotated[
-        float, typer.Option(help="Clearance that costs nothing any more [m].")
+        float, typer.Option(help="Clearance from which on there is no extra cost [m].")
     ] = PLAIN.inflation_radius,
     confidence_weight: Annotated[
-        float, typer.Option(help="Extra cost of a metre of confidence 0 [m/m].")
+        float, typer.Option(help="Extra cost per metre at confidence 0 [m/m].")
     ] = PLAIN.confidence_weight,
     unknown_weight: Annotated[
-        float, typer.Option(help="Extra cost of an unknown metre, if penalised [m/m].")
+        float,
+        typer.Option(help="With --unknown penalise: extra cost per metre in unknown space [m/m]."),
     ] = PLAIN.unknown_weight,
-    time_limit: Annotated[float, typer.Option(help="Give up after [s].")] = 30.0,
+    time_limit: Annotated[float, typer.Option(help="Time limit of planning [s].")] = 30.0,
     settings: Annotated[
         list[str] | None,
         typer.Option(
             "--set",
             metavar="NAME=VALUE",
-            help=f"A setting of the planner: {SETTINGS}; OMPL's"
-            " planners: space, seed, iterations, goals and others, see docs/settings.md.",
+            help=f"Setting of the planner; can be repeated. {SETTINGS}; planners of OMPL: space,"
+            " seed, iterations, goals and others, see docs/settings.md.",
         ),
     ] = None,
-    straighten: Annotated[bool, typer.Option("--shortcut", help="Pull the route tight.")] = False,
+    straighten: Annotated[bool, typer.Option("--shortcut", help="Shorten the route.")] = False,
     turning_radius: Annotated[
         float | None,
         typer.Option(
-            "--smooth", metavar="R", help="Pull it tight and turn with at least this radius [m]."
+            "--smooth", metavar="R", help="Shorten the route and round it to this radius [m]."
         ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Plan a collision-free route on a map."""
-    if out is not None:
-        format_of(out)
-        check_writable(out, sources=files_of(map_file))
-    if plot is not None:
-        check_picture(plot, sources=files_of(map_file))
+    _check_files(map_file, out=out, plot=plot)
     if planner == ALL and (out or settings or straighten or turning_radius is not None):
         options = "--out, --set, --shortcut and --smooth"
         raise typer.BadParameter(f"{options} are for one planner, not {ALL}")
     if inflation_radius != PLAIN.inflation_radius and clearance_weight == 0:
         raise typer.BadParameter("--inflation-radius needs a --clearance-weight above 0")
-    grid = load_map(map_file)
-    if plot is not None:
-        check_flat(grid, map_file)
-        known_bounds(grid)  # a map too large to draw is refused before the search
     problem = PlanningProblem(
-        grid,
+        _load_map(map_file, draws=plot is not None),
         start=numbers("start", start, 2, 3),
         goal=numbers("goal", goal, 2, 3),
         footprint=outline(footprint),
-        unknown=cast(Unknown, unknown),  # the problem refuses others, in its own words
+        unknown=cast(Unknown, unknown),  # other values raise in PlanningProblem
         clear_start=clear_start,
         costs=CostSettings(
             clearance_weight=clearance_weight,
@@ -139,39 +144,66 @@ def plan_command(
     if planner == ALL:
         _compare(problem, plot, time_limit, as_json=as_json, title=f"routes on {map_file}")
         return
-    with patiently("planning; what was never used before is compiled now"):
+    with show_waiting("planning (the first use of a planner compiles it)"):
         chosen = {"time_limit": time_limit, **assignments(settings or [])}
-        get_planner(planner).settings(**chosen)  # a name that `plan` takes itself is no setting
-        route = plan(problem, planner, **chosen)
-        graph = route.graph
-        if turning_radius is not None:
-            route = smooth(problem, route, turning_radius=turning_radius)
-        elif straighten:
-            route = shortcut(problem, route)
+        get_planner(planner).settings(**chosen)  # refuses the names of parameters of `plan`
+        planned = plan(problem, planner, **chosen)
+        route = _shorten(problem, planned, straighten=straighten, turning_radius=turning_radius)
     if out is not None:
         route.save(out)
     if plot is not None:
-        draw_map(
-            problem.grid,
-            plot,
-            waypoints=route.waypoints,
-            footprint=problem.shape.to_value(),
-            headings=route.headings,
-            graph=graph,
-        )
+        _draw(problem, route, planned.graph, plot)
     emit(route.to_dict(), as_json=as_json, title=f"route of {planner} on {map_file}")
+
+
+def _check_files(map_file: Path, *, out: Path | None, plot: Path | None) -> None:
+    """Check that the files of route and picture can be written, and are none of the map's."""
+    if out is not None:
+        format_of(out)
+        check_writable(out, sources=files_of(map_file))
+    if plot is not None:
+        check_picture(plot, sources=files_of(map_file))
+
+
+def _load_map(map_file: Path, *, draws: bool) -> ConfidenceGrid:
+    """Load a map; if it is to be drawn, refuse one that can't be before the search."""
+    grid = load_map(map_file)
+    if draws:
+        check_flat(grid, map_file)
+        known_bounds(grid)  # raises for a map too large to draw
+    return grid
+
+
+def _shorten(
+    problem: PlanningProblem, route: Route, *, straighten: bool, turning_radius: float | None
+) -> Route:
+    """Return the route that ``--smooth`` or ``--shortcut`` gives; without them, the same route."""
+    if turning_radius is not None:
+        return smooth(problem, route, turning_radius=turning_radius)
+    return shortcut(problem, route) if straighten else route
+
+
+def _draw(problem: PlanningProblem, route: Route, graph: Graph | None, plot: Path) -> None:
+    draw_map(
+        problem.grid,
+        plot,
+        waypoints=route.waypoints,
+        footprint=problem.shape.to_value(),
+        headings=route.headings,
+        graph=graph,
+    )
 
 
 def _compare(
     problem: PlanningProblem, plot: Path | None, time_limit: float, *, as_json: bool, title: str
 ) -> None:
-    """Plan with every planner of our own; say why one brings no route, and go on."""
+    """Plan with every planner of `OWN_PLANNERS`; report why a planner fails, and continue."""
     routes: dict[str, Route] = {}
     refused: dict[str, str] = {}
     failures: list[NoRouteError | ProblemError] = []
     names = sorted(OWN_PLANNERS)
     for name in show_progress(names, total=len(names), what="planners"):
-        _warm_up(name)  # the table's seconds are those of planning, not of compiling
+        _warm_up(name)  # the seconds in the table do not include compilation
         try:
             routes[name] = plan(problem, name, time_limit=time_limit)
         except (NoRouteError, ProblemError) as error:
@@ -183,8 +215,8 @@ def _compare(
         lines = {name: route.waypoints for name, route in routes.items()}
         draw_map(problem.grid, plot, lines=lines)
     if as_json:
-        found = {name: route.to_dict() for name, route in routes.items()}
-        emit({"routes": found, "refused": refused}, as_json=True, title=title)
+        by_name = {name: route.to_dict() for name, route in routes.items()}
+        emit({"routes": by_name, "refused": refused}, as_json=True, title=title)
         return
     rows = {name: {key: getattr(route, key) for key in COLUMNS} for name, route in routes.items()}
     emit_rows(rows, title=title)
@@ -193,6 +225,6 @@ def _compare(
 
 
 def _warm_up(planner: str) -> None:
-    """Have all compiled, or loaded, that a planner needs."""
+    """Compile the kernels that a planner needs."""
     field = grid_of(BlockedMap(np.zeros((9, 9), bool), np.zeros((9, 9), bool), 1.0, (0.0, 0.0)))
     plan(PlanningProblem(field, start=(2, 2, 0), goal=(7, 5, 0), footprint=0.5), planner)

@@ -1,4 +1,4 @@
-"""``groundmap plot``: a picture of a map, and of a route on it."""
+"""``groundmap plot``: draw a map, a route on it, or a single view of a log."""
 
 from __future__ import annotations
 
@@ -27,26 +27,30 @@ def plot_command(
         typer.Argument(metavar="MAP", help="A map, as for `plan`; with --explain, a log."),
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Picture: .png, .pdf or .svg; beside MAP unless told.")
+        Path | None, typer.Option(help="Picture: .png, .pdf or .svg; default: beside MAP.")
     ] = None,
     explain: Annotated[
         int | None,
-        typer.Option(metavar="VIEW", help="Take view number VIEW of a log apart, from 0."),
+        typer.Option(
+            metavar="VIEW", help="Draw the evidence of view number VIEW of a log, from 0."
+        ),
     ] = None,
     camera_height: Annotated[
         float | None,
-        typer.Option(help="With --explain: height of the camera above level ground [m]."),
+        typer.Option(
+            help="With --explain: height of the camera above level ground [m]; default: fitted."
+        ),
     ] = None,
     config: ConfigOption = None,
     bounds: Annotated[
         str | None,
-        typer.Option(metavar="XMIN,YMIN,XMAX,YMAX", help="Part to draw [m]; all unless told."),
+        typer.Option(metavar="XMIN,YMIN,XMAX,YMAX", help="Part to draw [m]; default: all."),
     ] = None,
-    route: Annotated[Path | None, typer.Option(help="GeoJSON that `plan --out` wrote.")] = None,
-    footprint: Annotated[float, typer.Option(help="Radius drawn along the route [m].")] = 0.0,
+    route: Annotated[Path | None, typer.Option(help="Route to draw: GeoJSON of `plan`.")] = None,
+    footprint: Annotated[float, typer.Option(help="Radius to draw along the route [m].")] = 0.0,
     as_json: JsonOption = False,
 ) -> None:
-    """Draw a map: free, non-free, contested and unknown space, and where it was seen from."""
+    """Draw a map (free, non-free, contested, unknown), its trajectory, and a route on it."""
     picture = out or _beside(map_file)
     draw.check_picture(picture, sources=files_of(map_file))
     if explain is not None:
@@ -84,9 +88,9 @@ def draw_map(
     lines: Mapping[str, Floats] | None = None,
     graph: Graph | None = None,
 ) -> None:
-    """Draw a map, its trajectory, and a route or several lines with their names into a file.
+    """Draw a map, its trajectory, and a route or several named lines, to a file.
 
-    The tree or roadmap that a route was found in lies under it.
+    The graph is the tree or roadmap of a sampling planner; it is drawn below the route.
     """
     box = draw.known_bounds(grid) if bounds is None else bounds
     figure, axes = draw.new_figure(box)
@@ -102,7 +106,7 @@ def draw_map(
 
 
 def _beside(map_file: Path) -> Path:
-    """Return a picture's name: for a map of map_server, none that its image may have."""
+    """Return the default name of a picture; it differs from the image of a map_server map."""
     if map_file.suffix.lower() in (".yaml", ".yml"):
         return map_file.with_name(f"{map_file.stem}-plot.png")
     return map_file.with_suffix(".png")
@@ -115,7 +119,7 @@ def _draw_view(
     settings: dict[str, dict[str, Any]],
     out: Path,
 ) -> None:
-    """Draw one view of a log, taken apart, into a file."""
+    """Draw the evidence of one view of a log, to a file."""
     log = read_views(source)
     if not 0 <= number < len(log):
         raise InputError("explain", f"a view from 0 to {len(log) - 1}", str(number))
@@ -127,7 +131,7 @@ def _draw_view(
 
 
 def _read_route(path: Path) -> Floats:
-    """Read the line of a GeoJSON Feature."""
+    """Return the line of a GeoJSON Feature, shape (n, 2) [m, map]."""
     expected = "a GeoJSON Feature with a LineString"
     feature = read_json(path, "a GeoJSON file")
     try:

@@ -1,4 +1,4 @@
-"""The settings file of the commands that map: TOML tables [mapper] and [ground]."""
+"""The settings file of ``map``, ``evaluate`` and ``plot``: TOML tables [mapper] and [ground]."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ TABLES = {"mapper": MapperSettings, "ground": GroundSettings}
 
 ConfigOption = Annotated[
     Path | None,
-    typer.Option(help="TOML file with tables [mapper] and [ground]: all other settings."),
+    typer.Option(help="TOML file with all other settings, in tables [mapper] and [ground]."),
 ]
 
 
 def read_settings(path: Path | None) -> dict[str, dict[str, Any]]:
-    """Return the tables of a settings file, validated; empty ones without a file.
+    """Return the validated tables of a settings file; without a file, empty tables.
 
     Raises
     ------
     FileFormatError
-        No such file, or not TOML.
+        The file does not exist or is not TOML.
     SettingsError
-        Another table, an unknown key (the nearest one is named), a value out of range.
+        An unknown table, an unknown key (the nearest one is named), a value out of range.
+
     """
     tables: dict[str, dict[str, Any]] = {name: {} for name in TABLES}
     if path is None:

@@ -1,4 +1,4 @@
-"""The ray caster, the usual way from features to a map: what each feature says alone."""
+"""The ray caster: the usual mapping method, in which each feature is evidence on its own."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ FREE, NONFREE = np.float32(-1.0), np.float32(1.0)
 class RayCaster:
     """Fuses views into a 2-D confidence grid by one thin ray per feature.
 
-    Features are sorted by height as `groundmap.GroundMapper` does, and views are fused by the same
-    rule; only what one view says differs.
+    It uses the height classes and the update rule of `groundmap.GroundMapper`; only the evidence
+    of a view differs.
 
     Parameters
     ----------
     **settings
-        `groundmap.settings.MapperSettings`; those about links, spread and support do nothing here.
+        `groundmap.settings.MapperSettings`; those of links, uncertainty and support have no effect.
 
     Raises
     ------
@@ -45,7 +45,7 @@ class RayCaster:
         Raises
         ------
         NoGroundPlaneError
-            The view has no plane, or its camera looks at the ground or the sky.
+            The view has no plane, or its camera looks straight at the ground or the sky.
         """
         ground_view = flatten(view, self.settings)
         evidence = rays_of(ground_view, self.grid)
@@ -54,10 +54,17 @@ class RayCaster:
 
 
 def rays_of(ground_view: GroundView, grid: ConfidenceGrid) -> Evidence:
-    """Draw the rays of one view into cells: one z per cell, non-free before free.
+    """Return the evidence of the rays of one view: one z per cell.
 
-    The cells from the camera to a feature are free (-1), its own included; that of an obstacle
-    feature is non-free (+1), whatever passes through. Of a segment the two ends count.
+    The cells from the camera to a feature, the cell of the feature included, are free (-1). The
+    cell of an obstacle feature is non-free (+1), even if other rays pass through it. The features
+    of a segment are its two ends.
+
+    Parameters
+    ----------
+    ground_view : GroundView
+    grid : ConfidenceGrid
+        Resolution and origin of the cells.
     """
     origin = _cells(ground_view, grid, np.zeros((1, 2)))
     obstacles, grounds = (
@@ -74,7 +81,7 @@ def rays_of(ground_view: GroundView, grid: ConfidenceGrid) -> Evidence:
 
 
 def _cells(ground_view: GroundView, grid: ConfidenceGrid, xy: Floats) -> Floats:
-    """Carry places over from the frame ``view`` to cells (x along columns), unrounded."""
+    """Convert positions in the frame ``view`` to fractional cells (col, row)."""
     cos, sin = ground_view.forward
     to_map = np.array([(cos, -sin), (sin, cos)])
     cells: Floats = (ground_view.viewpoint + xy @ to_map.T - grid.origin) / grid.resolution

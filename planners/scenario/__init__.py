@@ -1,1 +1,1 @@
-"""Scenarios: simulated worlds or logs, and the bounds that their maps must keep."""
+"""Scenarios: simulated worlds or logs, with bounds on the figures of their maps and routes."""

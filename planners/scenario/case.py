@@ -1,4 +1,4 @@
-"""A scenario as its file has it: a world or a log, what is mapped of it, what it must keep."""
+"""The settings of a scenario: a world or a log, sensor, mapper, queries and bounds."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ FILE = "scenario.toml"
 class LogSettings(Settings):
     """A recorded log instead of a world."""
 
-    path: str = Field(description="folder of the log, from the scenario's file on")
+    path: str = Field(description="folder of the log, relative to the scenario's file")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scenario:
-    """One case, validated."""
+    """A validated scenario."""
 
     name: str
-    path: Path  #: of its file
-    why: str  #: the reason that it exists
+    path: Path  #: file of the scenario
+    why: str  #: purpose of the scenario
     seed: int
-    level_ground: bool  #: whether the ground is given, instead of fitted
+    level_ground: bool  #: whether the true ground plane is given, instead of fitted
     log: Path | None
     world: WorldGenerator | None
     solids: tuple[SolidSettings, ...]
@@ -48,35 +48,35 @@ class Scenario:
     mapper: MapperSettings
     ground: GroundSettings
     queries: tuple[QuerySettings, ...]
-    bounds: Mapping[str, Bound]  #: of ``[bounds]``; `queries.bounds_of` gives those of the queries
+    bounds: Mapping[str, Bound]  #: those of ``[bounds]``; `queries.bounds_of` has those of queries
 
 
 def find_scenarios(places: Iterable[Path]) -> list[Path]:
-    """Return the scenario files in folders, at any depth, by name.
+    """Return the scenario files in folders, at any depth and sorted by path.
 
     Raises
     ------
     FileFormatError
-        A place that does not exist, or holds no scenario.
+        A place does not exist or contains no scenario.
     """
-    found: list[Path] = []
+    paths: list[Path] = []
     for place in places:
         files = [place] if place.is_file() else sorted(place.rglob(FILE))
         if not files:
             raise FileFormatError(place, f"a folder with {FILE} files in it", "none")
-        found += files
-    return list(dict.fromkeys(found))
+        paths += files
+    return list(dict.fromkeys(paths))
 
 
 def load_scenario(path: Path) -> Scenario:
-    """Return the scenario of a file, called after its folder.
+    """Return the scenario of a file, named after its folder.
 
     Raises
     ------
     FileFormatError
-        Not TOML; a table or a key that a scenario does not have (the nearest is named), one that
-        it lacks, or a value out of its range; a bound in ``[bounds]`` on a figure that a query
-        holds itself. Neither replaces the other: state each figure's bound in one place.
+        The file is not TOML, has an unknown table or key (the nearest one is named), lacks one,
+        or has a value out of range; or ``[bounds]`` has a bound on a figure that a query bounds
+        too, although a figure has one bound.
     """
     content = read_toml(path, "a scenario file")
     try:
@@ -90,12 +90,12 @@ def load_scenario(path: Path) -> Scenario:
 
 
 class ScenarioSettings(Settings):
-    """What stands before the tables, and the tables' names."""
+    """Keys and tables of a scenario file."""
 
-    why: str = Field(pattern=r"\S", description="the reason that the scenario exists")
-    seed: int = Field(0, ge=0, description="of all random numbers")
+    why: str = Field(pattern=r"\S", description="purpose of the scenario")
+    seed: int = Field(0, ge=0, description="seed of all random numbers")
     level_ground: bool = Field(
-        False, description="give the ground's planes, level and where they are, instead of fitting"
+        False, description="use the true, level ground planes instead of fitted ones"
     )
     world: dict[str, Any] | None = None
     log: dict[str, Any] | None = None
@@ -118,7 +118,7 @@ def _scenario(path: Path, content: dict[str, Any]) -> Scenario:
     world = dict(head.world or {})
     solids = tuple(SolidSettings(**table) for table in _tables(world, "solids"))
     holes = tuple(HoleSettings(**table) for table in _tables(world, "holes"))
-    for solid in solids:  # what has no shape is refused here, not when it is run
+    for solid in solids:  # an invalid shape raises here, before the scenario runs
         solid.solids()
     for hole in holes:
         hole.hole()
@@ -127,7 +127,7 @@ def _scenario(path: Path, content: dict[str, Any]) -> Scenario:
         check_query(query)
     names = [query.name for query in queries]
     if len(set(names)) < len(names):
-        raise InputError("queries", "a name of its own for each", ", ".join(names))
+        raise InputError("queries", "of different names", ", ".join(names))
     bounds = {name: bound_from(name, table) for name, table in head.bounds.items()}
     for query in queries:
         check_stated_once(query, bounds, known_world=head.log is None)
@@ -152,7 +152,7 @@ def _scenario(path: Path, content: dict[str, Any]) -> Scenario:
 
 
 def _tables(world: dict[str, Any], name: str) -> list[dict[str, Any]]:
-    """Take the tables of a name out of the world's."""
+    """Remove the tables of a name from the world's table, and return them."""
     tables = world.pop(name, [])
     if not isinstance(tables, list) or not all(isinstance(one, dict) for one in tables):
         raise InputError(f"world.{name}", f"[[world.{name}]] tables", repr(tables))
@@ -163,6 +163,6 @@ def _generator(table: dict[str, Any], folder: Path) -> WorldGenerator:
     kind = table.pop("kind", "empty")
     if not isinstance(kind, str) or kind not in GENERATORS:
         raise InputError("world.kind", f"one of {', '.join(sorted(GENERATORS))}", repr(kind))
-    if isinstance(table.get("path"), str):  # from the scenario's file on
+    if isinstance(table.get("path"), str):  # relative to the scenario's file
         table["path"] = str(folder / table["path"])
     return GENERATORS[kind](**table)

@@ -1,4 +1,4 @@
-"""What running one scenario gives."""
+"""Outcomes of scenarios, and bounds on their figures."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from typing import Any
 
 from planners.scenario.patterns import is_found
 
-REASON = "reason"  # figure of a query that an error answers: its sentence
-Figure = float | int | str | None  # None: there was nothing to measure
+REASON = "reason"  # figure of a query without a route: the message of the error
+Figure = float | int | str | None  # None: not measured
 
 
 @dataclass(frozen=True)
 class Bound:
-    """What a figure is held to."""
+    """Bound on a figure: a range, a value, or a pattern."""
 
     min: float | None = None
     max: float | None = None
     equals: Figure = None
-    matches: str | None = None  #: a pattern that a sentence holds
+    matches: str | None = None  #: a pattern to search for in a text
 
     def holds(self, value: Figure) -> bool:
-        """Return whether a figure keeps to it; one that is missing or not a number does not."""
+        """Return whether a figure satisfies the bound; None and NaN do not."""
         if self.equals is not None:
             return value == self.equals
         if self.matches is not None:
@@ -32,31 +32,31 @@ class Bound:
         return (self.min is None or value >= self.min) and (self.max is None or value <= self.max)
 
     def __str__(self) -> str:
-        """Return it as people write it: ``>= 0.97``."""
+        """Return the bound as text, such as ``≥ 0.97``."""
         if self.equals is not None:
             return f"= {self.equals}"
         if self.matches is not None:
-            return f"with '{self.matches}' in it"
+            return f"a match of '{self.matches}'"
         parts = [("≥", self.min), ("≤", self.max)]
         return " and ".join(f"{sign} {value:g}" for sign, value in parts if value is not None)
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """One scenario, run."""
+    """Result of one scenario."""
 
     name: str
-    why: str  #: the reason that the scenario exists
-    passed: bool | None  #: None where it was skipped
-    figures: dict[str, Figure] = field(default_factory=dict)  #: in the order to show them
-    bounds: dict[str, Bound] = field(default_factory=dict)  #: by the figure that they hold
-    missed: tuple[str, ...] = ()  #: a sentence for each bound that does not hold
-    skipped: str = ""  #: why, where it was
+    why: str  #: purpose of the scenario
+    passed: bool | None  #: None if skipped
+    figures: dict[str, Figure] = field(default_factory=dict)  #: in the order of display
+    bounds: dict[str, Bound] = field(default_factory=dict)  #: by the name of the figure
+    missed: tuple[str, ...] = ()  #: a sentence for each missed bound
+    skipped: str = ""  #: reason why it was skipped
     picture: bytes = b""  #: PNG
     seconds: float = 0.0
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what ``--json`` prints of it."""
+        """Return the object that ``--json`` prints."""
         return {
             "name": self.name,
             "passed": self.passed,

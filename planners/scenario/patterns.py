@@ -1,4 +1,4 @@
-"""Patterns that scenario files hold: compiled and searched for with bounds on size and time."""
+"""Regular expressions of scenario files, searched for with bounds on size and time."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from groundmap.printable import format_value
 MOST_CHARACTERS = 500
 TIME_LIMIT = 5.0  # [s] of a search
 PLAIN = re.compile(r"[^\\.^$*+?{}\[\]|()]*")
-# Nothing interrupts a search in this process: some patterns take longer than the universe is old.
-# The alarm ends it where the process that waits for it was killed.
+# A search in this process can't be interrupted, and some patterns take exponential time. The alarm
+# ends the child process if its parent was killed.
 SEARCH = """
 import re, signal, sys
 getattr(signal, "alarm", abs)(10)
@@ -24,18 +24,24 @@ sys.exit(0 if re.search(sys.argv[1], sys.argv[2]) else 1)
 
 
 def check_pattern(name: str, pattern: str) -> None:
-    """Check that a pattern is one.
+    """Check that a pattern is a regular expression.
+
+    Parameters
+    ----------
+    name : str
+        Name of the setting, for the message.
+    pattern : str
 
     Raises
     ------
     InputError
-        No regular expression, or one of more than 500 characters.
+        The pattern is no regular expression, or has more than 500 characters.
     """
     if len(pattern) > MOST_CHARACTERS:
         raise InputError(name, f"{MOST_CHARACTERS} characters at most", str(len(pattern)))
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of what a later Python may understand otherwise
+            warnings.simplefilter("ignore")  # FutureWarning of syntax that can change its meaning
             re.compile(pattern)
     except (re.error, RecursionError, OverflowError) as error:
         raise InputError(name, f"a regular expression ({error})", format_value(pattern)) from error
@@ -43,7 +49,12 @@ def check_pattern(name: str, pattern: str) -> None:
 
 @cache
 def is_found(pattern: str, text: str) -> bool:
-    r"""Return whether a text holds a pattern; one that isn't found within 5 s is not found.
+    r"""Return whether a pattern matches somewhere in a text; False after 5 s.
+
+    Parameters
+    ----------
+    pattern : str
+    text : str
 
     Examples
     --------

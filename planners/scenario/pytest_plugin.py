@@ -1,6 +1,6 @@
-"""Scenarios as tests: ``pytest -p planners.scenario.pytest_plugin FOLDER`` runs one test for each.
+"""Scenarios as tests: ``pytest -p planners.scenario.pytest_plugin FOLDER``.
 
-Each ``scenario.toml`` is a test, called after its folder.
+Each ``scenario.toml`` below the folder is one test, named after the folder that it lies in.
 """
 
 from __future__ import annotations
@@ -18,17 +18,23 @@ from planners.scenario.run import run_scenario
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> ScenarioFile | None:
-    """Take scenario files for test files."""
+    """Collect scenario files as test files.
+
+    Parameters
+    ----------
+    file_path : Path
+    parent : pytest.Collector
+    """
     if file_path.name != FILE:
         return None
     return ScenarioFile.from_parent(parent, path=file_path)
 
 
 class ScenarioFile(pytest.File):
-    """A file with one scenario."""
+    """A file of one scenario."""
 
     def collect(self) -> Iterator[ScenarioItem]:
-        """Yield its one test."""
+        """Yield the test of the scenario."""
         yield ScenarioItem.from_parent(self, name=self.path.parent.name)
 
 
@@ -36,7 +42,7 @@ class ScenarioItem(pytest.Item):
     """A scenario that passes if all its bounds hold."""
 
     def runtest(self) -> None:
-        """Run it."""
+        """Run the scenario."""
         outcome = run_scenario(self.path)
         if outcome.passed is None:
             pytest.skip(outcome.skipped)
@@ -44,13 +50,20 @@ class ScenarioItem(pytest.Item):
             raise BoundsMissedError(outcome)
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], *args: Any) -> Any:
-        """Say which bounds were missed, or what is wrong with the file."""
+        """Return the missed bounds, or the error of the file.
+
+        Parameters
+        ----------
+        excinfo : pytest.ExceptionInfo
+        *args
+            Passed to pytest's method.
+        """
         if isinstance(excinfo.value, BoundsMissedError | FileFormatError):
             return str(excinfo.value)
         return super().repr_failure(excinfo, *args)
 
     def reportinfo(self) -> tuple[Path, None, str]:
-        """Return where it is and what it is called."""
+        """Return path, line and name of the test."""
         return self.path, None, self.name
 
 

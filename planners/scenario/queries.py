@@ -1,4 +1,4 @@
-"""The queries of a scenario's file, and the bounds that they and ``[bounds]`` state."""
+"""The queries of a scenario file, their bounds, and the bounds in ``[bounds]``."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from planners.registry import PLANNERS
 from planners.scenario.outcome import REASON, Bound
 from planners.scenario.patterns import check_pattern
 
-OUTCOME = "route"  # what is expected where no error is
-# Where a query states the bounds of its figures.
+OUTCOME = "route"  # outcome of a query without an error
+# The key of a query that bounds each of its figures, as a hint for an error.
 STATED_BY = {
     "outcome": "Set 'expect' of the query.",
     REASON: "Set 'reason' of the query.",
-    "collisions": "A route never collides; 'robot_radius' of the query says with what.",
-    "ratio": "Leave out 'max_ratio' of the query, or this bound.",
+    "collisions": "The bound is always 0; set 'robot_radius' of the query for the size.",
+    "ratio": "Omit 'max_ratio' of the query, or this bound.",
 }
 
 
@@ -38,48 +38,50 @@ Expected = Literal[
 
 
 class QuerySettings(Settings):
-    """A route to be asked for, and what is expected of it."""
+    """A query, its expected outcome and its bounds."""
 
-    name: str = Field(description="what figures of it are called after")
+    name: str = Field(description="prefix of the names of its figures")
     start: tuple[float, ...] = Field(description="x, y [m, map] and optionally yaw [rad]")
     goal: tuple[float, ...] = Field(description="x, y [m, map] and optionally yaw [rad]")
     footprint: float | tuple[tuple[float, float], ...] = Field(
-        description="what to plan with: a radius [m], or the corners of an outline [m, base_link]"
+        description="footprint to plan with: a radius [m], or corners [m, base_link]"
     )
     robot_radius: float | None = Field(
-        None, ge=0, description="what must not touch the true world; the footprint unless told [m]"
+        None,
+        ge=0,
+        description="radius that must not touch the true world [m]; default: the footprint's",
     )
     expect: Expected = Field("route", description="'route', or the name of the error")
     reason: str | None = Field(
-        None, description="pattern that the error's sentence holds, as Python's re takes it"
+        None, description="regular expression that matches in the error's message"
     )
     planner: str = Field("astar", description="name of the planner")
     unknown: Unknown = Field("avoid", description="unknown and contested space")
     time_limit: float | None = Field(
-        None, ge=0, description="time limit [s]; the planner's own unless told"
+        None, ge=0, description="time limit [s]; default: that of the planner"
     )
     settings: dict[str, Any] = Field(
-        default_factory=dict, description="of the planner, such as seed and iterations"
+        default_factory=dict, description="settings of the planner, such as seed and iterations"
     )
     max_ratio: float | None = Field(
-        None, ge=1, description="of the route's length to that of the best in the true world"
+        None, ge=1, description="most length, divided by that of the best route in the true world"
     )
 
     @property
     def radius(self) -> float:
-        """Radius of the disc that holds the footprint at every heading [m]."""
+        """Radius of the disc around the footprint [m]."""
         return Footprint.of(self.footprint).radius
 
 
 class BoundSettings(Settings):
-    """What a figure is held to."""
+    """A bound in ``[bounds]``."""
 
-    min: float | None = Field(None, description="it is at least this")
-    max: float | None = Field(None, description="it is at most this")
+    min: float | None = Field(None, description="least value of the figure")
+    max: float | None = Field(None, description="greatest value of the figure")
 
 
 def check_query(query: QuerySettings) -> None:
-    """Refuse what would only show when the query is asked, or never."""
+    """Check planner, settings, footprint and reason of a query before the scenario runs."""
     if query.planner not in PLANNERS:
         known = ", ".join(sorted(PLANNERS))
         raise InputError("queries.planner", f"one of {known}", repr(query.planner))
@@ -97,7 +99,14 @@ def check_query(query: QuerySettings) -> None:
 
 
 def bounds_of(query: QuerySettings, *, known_world: bool) -> dict[str, Bound]:
-    """Return what the figures of a query are held to by the query itself."""
+    """Return the bounds of a query on its figures.
+
+    Parameters
+    ----------
+    query : QuerySettings
+    known_world : bool
+        Whether the true world is known: a simulated one.
+    """
     bounds = {"outcome": Bound(equals=query.expect)}
     if query.reason is not None:
         bounds[REASON] = Bound(matches=query.reason)
@@ -111,24 +120,40 @@ def bounds_of(query: QuerySettings, *, known_world: bool) -> dict[str, Bound]:
 def check_stated_once(
     query: QuerySettings, bounds: Mapping[str, Bound], *, known_world: bool
 ) -> None:
-    """Refuse a bound on a figure that the query holds, which would replace or be replaced."""
-    for key, held in bounds_of(query, known_world=known_world).items():
+    """Check that ``[bounds]`` has no bound on a figure that the query bounds itself.
+
+    Parameters
+    ----------
+    query : QuerySettings
+    bounds : mapping of str to Bound
+        Those of ``[bounds]``.
+    known_world : bool
+        Whether the true world is known: a simulated one.
+    """
+    for key, bound in bounds_of(query, known_world=known_world).items():
         name = f"{query.name}.{key}"
         if name in bounds:
             raise InputError(
                 f"bounds.{name}",
-                f"no bound, since the query holds {key} {held} itself",
+                f"no bound, since the query has its own: {key} {bound}",
                 str(bounds[name]),
                 hint=STATED_BY[key],
             )
 
 
 def bound_from(name: str, table: dict[str, Any]) -> Bound:
-    """Return the bound of a table under ``[bounds]``."""
+    """Return the bound of a table in ``[bounds]``.
+
+    Parameters
+    ----------
+    name : str
+        Name of the figure.
+    table : dict
+    """
     bound = BoundSettings(**table)
     if bound.min is None and bound.max is None:
         raise InputError(f"bounds.{name}", "min, max, or both", "neither")
     if bound.min is not None and bound.max is not None and bound.min > bound.max:
         got = f"{bound.min:g} and {bound.max:g}"
-        raise InputError(f"bounds.{name}", "min of at most max", got)
+        raise InputError(f"bounds.{name}", "min not above max", got)
     return Bound(min=bound.min, max=bound.max)

@@ -1,4 +1,4 @@
-"""The report's section on why one triangulates."""
+"""The section of the report that compares triangulation with ray casting."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from planners.scenario.report import Section
 
 SHOWN = (50, 100, 300)  # features in a view, in the table
 TEXT = """
-What a single view shows of 20 random rooms with boxes: features triangulated, against as many
-thin rays, each cell updated once per view. Left, the share of the truly visible freespace that is
-found; right, the share of what is called free that is wrong by more than 0.3 m.
+Freespace found in a single view of 20 random rooms with boxes: by triangulation, and by as many
+thin rays with each cell updated once per view. Left, the share of the truly visible freespace that
+is found; right, the share of the free cells that are wrong by more than 0.3 m.
 """
 
 
-def why_one_triangulates() -> Section:
-    """Return the curves of recall over the number of features, for both systems."""
-    found = compare_recall()
+def triangulation_section() -> Section:
+    """Return the curves of recall over the number of features, for both methods."""
+    recall = compare_recall()
     curves = {
-        "points, triangulated": found.points,
-        "segments, triangulated": found.segments,
-        "points, as rays": found.rays,
+        "points, triangulated": recall.points,
+        "segments, triangulated": recall.segments,
+        "points, as rays": recall.rays,
     }
     rows = [("features", *curves)]
     for count in SHOWN:
@@ -30,7 +30,7 @@ def why_one_triangulates() -> Section:
             row.append(f"{curve.free_recall[at]:.3f} / {curve.false_free_beyond[at]:.4f}")
         rows.append(tuple(row))
     return Section(
-        title="Why one triangulates",
+        title="Triangulation and ray casting",
         text=" ".join(TEXT.split()),
         picture=draw.curves_png(curves),
         rows=rows,

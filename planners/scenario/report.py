@@ -1,4 +1,4 @@
-"""The report: one HTML file with all outcomes and their pictures, which needs no other file."""
+"""The report: a self-contained HTML file with all outcomes and their pictures."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 from groundmap.files.archive import write_atomically
 from planners.scenario.outcome import Figure, Outcome
-from planners.scenario.table import remarks, summary, verdict
+from planners.scenario.summary import remarks, summary, verdict
 
 TITLE = "Scenarios"
-MARKS = {True: "✓", False: "✗", None: "○"}  # verdicts, and whether bounds hold; not by colour alone
+MARKS = {True: "✓", False: "✗", None: "○"}  # of verdicts and bounds, in addition to the colour
 CLASSES = {True: "good", False: "bad", None: "idle"}
 STYLE = """
 :root { color-scheme: light dark; --ink: #1b1b1f; --soft: #5c5f66; --paper: #fff;
@@ -44,12 +44,12 @@ h2 .verdict { font-size: 1rem; margin-left: 0.5rem; }
 
 
 class Section(NamedTuple):
-    """A part of the report beside the cases: an experiment, with its picture and its numbers."""
+    """A section of the report about an experiment, with a picture and a table."""
 
     title: str
     text: str
     picture: bytes = b""  #: PNG
-    rows: Sequence[Sequence[Figure]] = ()  #: of a table, the first with the names of the columns
+    rows: Sequence[Sequence[Figure]] = ()  #: rows of the table; the first has the column names
 
 
 def write_report(
@@ -61,9 +61,9 @@ def write_report(
     ----------
     path : path
     outcomes : sequence of Outcome
-        In the order to show them.
+        In the order of display.
     sections : sequence of Section
-        What to show after the cases.
+        Sections after the outcomes.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def write_report(
 
 
 def format_figure(value: Figure) -> str:
-    """Return a figure as people read it: four digits of what is not whole.
+    """Return a figure as text; numbers that are not integers have four digits.
 
     Examples
     --------
@@ -106,7 +106,7 @@ def _page(outcomes: Sequence[Outcome], sections: Sequence[Section]) -> str:
 
 
 def _overview(outcomes: Sequence[Outcome]) -> str:
-    """Return the table of all cases, each with a link to its part of the page."""
+    """Return the table of all outcomes, with links to their sections."""
     rows = (
         _tag(
             "tr",
@@ -122,7 +122,7 @@ def _overview(outcomes: Sequence[Outcome]) -> str:
 
 
 def _case(number: int, outcome: Outcome) -> str:
-    """Return the part of one case."""
+    """Return the section of one outcome."""
     mark = _tag("span", _verdict(outcome), kind="verdict")
     parts = [
         _tag("h2", f"{escape(outcome.name)} {mark}", name=f"case-{number}"),
@@ -135,7 +135,7 @@ def _case(number: int, outcome: Outcome) -> str:
 
 
 def _figures(outcome: Outcome) -> str:
-    """Return the table of figures, with their bounds; a bound may hold a figure that is missing."""
+    """Return the table of figures and bounds, including bounds on missing figures."""
     names = [*outcome.figures, *(name for name in outcome.bounds if name not in outcome.figures)]
     if not names or outcome.passed is None:
         return ""
@@ -190,13 +190,14 @@ def _list(sentences: Sequence[str]) -> str:
 
 
 def _table(names: Sequence[str], rows: Iterable[str], *, numbers: Sequence[str] = ()) -> str:
-    """Return a table that scrolls sideways where the screen is narrower."""
+    """Return a table that scrolls horizontally on a narrow screen."""
     head = (_tag("th", escape(name), kind="number" if name in numbers else "") for name in names)
     table = _tag("table", _tag("thead", _tag("tr", *head)), _tag("tbody", *rows))
     return _tag("div", table, kind="wide")
 
 
 def _tag(element: str, *content: str, kind: str = "", name: str = "") -> str:
-    """Return an element around HTML that is escaped already; `kind` is its class, `name` its id."""
-    given = (f' {key}="{escape(value)}"' for key, value in (("class", kind), ("id", name)) if value)
-    return f"<{element}{''.join(given)}>{''.join(content)}</{element}>"
+    """Return an element with escaped HTML as content; `kind` is its class, `name` its id."""
+    values = (("class", kind), ("id", name))
+    attributes = (f' {key}="{escape(value)}"' for key, value in values if value)
+    return f"<{element}{''.join(attributes)}>{''.join(content)}</{element}>"

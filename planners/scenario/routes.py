@@ -1,4 +1,4 @@
-"""The queries of a scenario: routes on the map, held against the true world."""
+"""Routes of a scenario's queries, compared with the true world."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from planners.scenario.outcome import REASON, Figure
 from planners.scenario.queries import OUTCOME, QuerySettings
 from planners.scenario.simulated import Simulated
 
-FINE = 0.05  # [m], cells of the true world's map
-MOST_CELLS = 5e7  # of it
-# Of the best route.
+FINE = 0.05  # [m], side of a cell in the map of the true world
+MOST_CELLS = 5e7  # in the map of the true world
+# Changes to a query for the best route in the true world.
 IN_TRUTH: dict[str, Any] = {
     "planner": "astar",
     "settings": {},
@@ -30,20 +30,26 @@ IN_TRUTH: dict[str, Any] = {
 
 
 class QueryOutcome(NamedTuple):
-    """What became of one query."""
+    """Result of one query."""
 
     query: QuerySettings
-    outcome: str  #: "route", or the error's name
-    reason: str  #: the error's sentence
+    outcome: str  #: "route", or the name of the error
+    reason: str  #: message of the error
     waypoints: Floats | None  #: shape (n, 2) [m, map]
     figures: dict[str, Figure]
 
 
-def ask(query: QuerySettings, grid: ConfidenceGrid) -> QueryOutcome:
-    """Plan on a map."""
-    told = dict(query.settings)
+def run_query(query: QuerySettings, grid: ConfidenceGrid) -> QueryOutcome:
+    """Plan the route of a query on a map.
+
+    Parameters
+    ----------
+    query : QuerySettings
+    grid : ConfidenceGrid
+    """
+    settings = dict(query.settings)
     if query.time_limit is not None:
-        told["time_limit"] = query.time_limit
+        settings["time_limit"] = query.time_limit
     try:
         problem = PlanningProblem(
             grid,
@@ -52,7 +58,7 @@ def ask(query: QuerySettings, grid: ConfidenceGrid) -> QueryOutcome:
             footprint=query.footprint,
             unknown=query.unknown,
         )
-        route = plan(problem, query.planner, **told)
+        route = plan(problem, query.planner, **settings)
     except PlanningError as error:
         name, reason = type(error).__name__, str(error)
         return QueryOutcome(query, name, reason, None, {"outcome": name, REASON: reason})
@@ -67,14 +73,22 @@ def ask(query: QuerySettings, grid: ConfidenceGrid) -> QueryOutcome:
 def compare_with_truth(
     answer: QueryOutcome, simulated: Simulated, fine: ConfidenceGrid
 ) -> QueryOutcome:
-    """Add what the true world says of a route: how near it comes, how much longer it is."""
+    """Add the figures of a route in the true world: clearance, collisions, ratio to the best.
+
+    Parameters
+    ----------
+    answer : QueryOutcome
+    simulated : Simulated
+    fine : ConfidenceGrid
+        Result of `true_map`.
+    """
     if answer.waypoints is None:
         return answer
     query = answer.query
     radius = query.radius if query.robot_radius is None else query.robot_radius
     line = shapely.LineString(answer.waypoints)
     distances = shapely.distance(line, shapely.get_parts(simulated.truth.obstacles))
-    best = ask(query.model_copy(update={"footprint": radius, **IN_TRUTH}), fine)
+    best = run_query(query.model_copy(update={"footprint": radius, **IN_TRUTH}), fine)
     optimum = best.figures.get("length")
     figures: dict[str, Figure] = {
         **answer.figures,
@@ -89,7 +103,7 @@ def compare_with_truth(
 
 
 def true_map(simulated: Simulated) -> ConfidenceGrid:
-    """Return the true world as a map of fine cells, free wherever no obstacle is."""
+    """Return a map of the true world with fine cells: free, except for obstacles."""
     window = simulated.window
     grid = ConfidenceGrid(resolution=FINE)
     sides = np.ceil(np.array(window.count.shape) * window.resolution / FINE)

@@ -1,4 +1,4 @@
-"""Running a scenario: map, plan, measure, compare with the bounds, draw."""
+"""Run a scenario: map, plan, measure, compare with the bounds, draw."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from groundmap.simulate.measures import measure
 from planners.scenario.case import Scenario, load_scenario
 from planners.scenario.outcome import Bound, Figure, Outcome
 from planners.scenario.queries import bounds_of
-from planners.scenario.routes import QueryOutcome, ask, compare_with_truth, true_map
+from planners.scenario.routes import QueryOutcome, compare_with_truth, run_query, true_map
 from planners.scenario.simulated import Simulated, simulate
 
 DPI = 100  # of the pictures in the report
@@ -25,12 +25,12 @@ MARGIN = 1.5  # [m] around the world, in pictures
 def run_scenario(path: Path) -> Outcome:
     """Run the scenario of a file.
 
-    A world that can't be mapped fails the scenario, with the error's sentence.
+    A scenario whose world can't be mapped fails, with the message of the error.
 
     Raises
     ------
     FileFormatError
-        The file is no scenario.
+        The file is not a scenario.
     """
     scenario = load_scenario(path)
     if scenario.log is not None and not scenario.log.exists():
@@ -46,8 +46,8 @@ def run_scenario(path: Path) -> Outcome:
     for answer in result.answers:
         name = answer.query.name
         figures |= {f"{name}.{key}": value for key, value in answer.figures.items()}
-        held = bounds_of(answer.query, known_world=scenario.log is None)
-        bounds |= {f"{name}.{key}": bound for key, bound in held.items()}
+        own_bounds = bounds_of(answer.query, known_world=scenario.log is None)
+        bounds |= {f"{name}.{key}": bound for key, bound in own_bounds.items()}
     missed = (result.error,) if result.error else _list_missed(figures, bounds, result.answers)
     return Outcome(
         name=scenario.name,
@@ -62,19 +62,19 @@ def run_scenario(path: Path) -> Outcome:
 
 
 class CaseResult(NamedTuple):
-    """What a scenario gave, before it is held to its bounds."""
+    """Figures of a scenario, before they are compared with its bounds."""
 
     figures: dict[str, Figure]
     answers: list[QueryOutcome]
-    picture: bytes  # PNG
-    error: str = ""  # why there is none of it
+    picture: bytes  #: PNG
+    error: str = ""  #: why there are no figures
 
 
 def _run_simulated(scenario: Scenario) -> CaseResult:
-    """Map a world and hold map and routes against it."""
+    """Map a simulated world; compare map and routes with it."""
     simulated = simulate(scenario)
     figures: dict[str, Figure] = dict(asdict(measure(simulated.window, simulated.truth)))
-    answers = [ask(query, simulated.grid) for query in scenario.queries]
+    answers = [run_query(query, simulated.grid) for query in scenario.queries]
     if answers:
         fine = true_map(simulated)
         answers = [compare_with_truth(answer, simulated, fine) for answer in answers]
@@ -82,7 +82,7 @@ def _run_simulated(scenario: Scenario) -> CaseResult:
 
 
 def _run_recorded(scenario: Scenario) -> CaseResult:
-    """Map a log, whose truth nobody knows, and judge it by features held out of it."""
+    """Map a log without ground truth, and judge the map by features held out of it."""
     assert scenario.log is not None
     settings, ground = scenario.mapper.model_dump(), scenario.ground.model_dump()
     verdicts = evaluate(read_views(scenario.log), ground=ground, **settings)
@@ -94,7 +94,7 @@ def _run_recorded(scenario: Scenario) -> CaseResult:
     mapper = GroundMapper(**settings)
     for view in fit_ground(read_views(scenario.log), **ground):
         mapper.integrate(view)
-    answers = [ask(query, mapper.grid) for query in scenario.queries]
+    answers = [run_query(query, mapper.grid) for query in scenario.queries]
     figure, axes = draw.new_figure(draw.known_bounds(mapper.grid))
     draw.draw_grid(mapper.grid, ax=axes)
     draw.draw_trajectory(mapper.grid.trajectory, ax=axes)
@@ -105,7 +105,7 @@ def _run_recorded(scenario: Scenario) -> CaseResult:
 
 
 def _picture(simulated: Simulated, answers: list[QueryOutcome], title: str) -> bytes:
-    """Draw truth, map and difference, of the world and a margin around it."""
+    """Draw truth, map and difference of the world and a margin around it."""
     truth, window = simulated.truth, simulated.window
     corners = window.world_to_cell(np.reshape(simulated.world.bounds, (2, 2)))
     margin = int(np.ceil(MARGIN / window.resolution))
@@ -143,7 +143,7 @@ def _picture(simulated: Simulated, answers: list[QueryOutcome], title: str) -> b
 def _list_missed(
     figures: dict[str, Figure], bounds: dict[str, Bound], answers: list[QueryOutcome]
 ) -> tuple[str, ...]:
-    """Return a sentence for each bound that does not hold."""
+    """Return a sentence for each missed bound."""
     reasons = {f"{answer.query.name}.outcome": answer.reason for answer in answers}
     routeless = tuple(f"{answer.query.name}." for answer in answers if answer.reason)
     sentences = []
@@ -151,7 +151,7 @@ def _list_missed(
         query, _, figure = name.rpartition(".")
         outcome = bounds.get(f"{query}.outcome")
         unexpected = outcome is not None and not outcome.holds(figures.get(f"{query}.outcome"))
-        # Where the outcome is not what was expected, that says it all.
+        # With an unexpected outcome, the other bounds of a query are not reported.
         if bound.holds(figures.get(name)) or (unexpected and figure != "outcome"):
             continue
         if name not in figures and not name.startswith(routeless):

@@ -1,4 +1,4 @@
-"""Mapping a simulated world, and the truth to compare the map with."""
+"""Map a simulated world, and compute the truth to compare the map with."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from groundmap.simulate.scan import scan
 from groundmap.simulate.truth import Truth, truth_of
 from planners.scenario.case import Scenario
 
-MOST_CELLS = 4e6  # of a world that is compared cell by cell
+MOST_CELLS = 4e6  # in a world, since it is compared cell by cell
 
 
 class Simulated(NamedTuple):
-    """A world, what was mapped of it, and what is true."""
+    """A world, its map, and the truth."""
 
     world: World
     grid: ConfidenceGrid
-    window: GridWindow  #: of the grid: all that the truth speaks of
+    window: GridWindow  #: cells of the map that the truth covers
     truth: Truth
 
 
 def simulate(scenario: Scenario) -> Simulated:
-    """Drive through a scenario's world and map it, as a user would map a log."""
+    """Drive through a scenario's world and map the views as those of a log."""
     world = build_world(scenario)
     assert scenario.drive is not None
     moves = drive(scenario.drive, np.random.default_rng((scenario.seed, 1)))
@@ -44,16 +44,23 @@ def simulate(scenario: Scenario) -> Simulated:
 
 
 def build_world(scenario: Scenario) -> World:
-    """Return the world of a scenario: what its generator makes, and what is named one by one."""
+    """Return the world of a scenario: that of its generator with the listed solids and holes."""
     assert scenario.world is not None
-    made = scenario.world.make(np.random.default_rng((scenario.seed, 0)))
+    world = scenario.world.make(np.random.default_rng((scenario.seed, 0)))
     solids = [solid for settings in scenario.solids for solid in settings.solids()]
     holes = [settings.hole() for settings in scenario.holes]
-    return replace(made, solids=(*made.solids, *solids), holes=(*made.holes, *holes))
+    return replace(world, solids=(*world.solids, *solids), holes=(*world.holes, *holes))
 
 
 def views_of(scenario: Scenario, world: World, moves: Drive) -> Iterable[View]:
-    """Return the views of the scenario's sensor, or of the ideal one that it asks for."""
+    """Return the views of the scenario's sensor; with ``[scan]``, those of an ideal sensor.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    world : World
+    moves : Drive
+    """
     if scenario.scan is not None:
         return scan(world, moves, scenario.sensor, scenario.scan, scenario.mapper)
     landmarks = sample_landmarks(world, np.random.default_rng((scenario.seed, 2)))
@@ -61,7 +68,7 @@ def views_of(scenario: Scenario, world: World, moves: Drive) -> Iterable[View]:
 
 
 def _window(world: World, grid: ConfidenceGrid) -> GridWindow:
-    """Return the map's window around the world and all that the map speaks of."""
+    """Return the cells of the map in the bounds of the world and of all observed cells."""
     known = known_bounds(grid)
     low = np.minimum(world.bounds[:2], known[:2])
     high = np.maximum(world.bounds[2:], known[2:])

@@ -1,4 +1,4 @@
-"""The file that `groundmap scenario new` starts a scenario with."""
+"""The file that `groundmap scenario new` writes."""
 
 from __future__ import annotations
 
@@ -9,34 +9,34 @@ from groundmap.files.archive import write_atomically
 from planners.scenario.case import FILE
 
 TEMPLATE = '''\
-# A scenario: a world that is known, what is mapped of it, and the bounds that it must keep.
+# A scenario: a simulated world, how it is mapped, and bounds on the figures of map and routes.
 # Run it with: groundmap scenario run {folder}
 # Metres, radians (headings of stops: degrees), seconds.
 
 why = """
-Say what would break if this case did: the reason that the scenario exists.
+State the purpose of the scenario: the property that its bounds check.
 """
-seed = 1                     # of all random numbers
+seed = 1                     # seed of all random numbers
 
 [world]                      # or [log] path = "...", a recorded log instead of a world
 kind = "empty"               # {kinds}
-bounds = [0, 0, 10, 6]       # of the ground with texture: xmin, ymin, xmax, ymax
-ground_texture = 12.0        # point features on it [1/m²]
+bounds = [0, 0, 10, 6]       # of the textured ground: xmin, ymin, xmax, ymax
+ground_texture = 12.0        # point features on the ground [1/m²]
 
-[[world.solids]]             # what stands there; one table each
-wall = [[0, 0], [10, 0], [10, 6], [0, 6], [0, 0]]   # its centre line
+[[world.solids]]             # one table per solid
+wall = [[0, 0], [10, 0], [10, 6], [0, 6], [0, 0]]   # centre line
 thickness = 0.2
-top = 2.5                    # height; `bottom` lifts it off the ground
-texture = 12.0               # point features on it [1/m²]
+top = 2.5                    # height of the top edge; `bottom` is that of the bottom edge
+texture = 12.0               # point features on the surfaces [1/m²]
 
 [[world.solids]]
 box = [4, 2, 5, 3]           # or pole = [x, y], polygon = [[x, y], ...], table = [x0, y0, x1, y1]
 top = 1.0
-# appears = 5.0              # there since when; vanishes = ... until when
+# appears = 5.0              # time at which it appears; vanishes = ... at which it vanishes
 # transparent = true         # glass
-# edges = false              # its edges are not matched as segments
+# edges = false              # without segment features on its edges
 
-# [[world.holes]]            # ground that lies lower
+# [[world.holes]]            # lowered ground
 # box = [7, 1, 8, 2]
 # depth = 0.5
 
@@ -45,47 +45,56 @@ fx = 700.0                   # [px]
 baseline = 0.54
 camera_height = 1.0
 pixel_noise_px = 0.5
-missing = 0.1                # share of the features in sight that are not matched
-false_matches = 0.02         # share that is matched with any disparity
+missing = 0.1                # share of the visible features that are not matched
+false_matches = 0.02         # share that is matched with a random disparity
 
 [drive]
 stops = [                    # x, y, heading [deg]
     [1, 1, 0], [8.5, 1, 0], [8.5, 1, 90], [8.5, 4.8, 90], [8.5, 4.8, 180],
     [1.5, 4.8, 180], [1.5, 4.8, 270], [1.5, 1.5, 270],
 ]
-every = 0.5                  # a view at least this often
+every = 0.5                  # distance between views, at most
 
 [mapper]                     # as in the settings file of `groundmap map`
 resolution = 0.1524
 
-[[queries]]                  # routes to ask for
+[[queries]]                  # routes to plan
 name = "around"
 start = [1.5, 1.2]
 goal = [8, 4.5]
 footprint = 0.3              # radius to plan with, or an outline: [[x, y], ...]
-robot_radius = 0.25          # what must not touch the true world
-expect = "route"             # or the error: EnclosedError, NonFreeError, UnknownSpaceError, ...
-# reason = "enclosed"       # what the error's sentence holds: a regular expression
+robot_radius = 0.25          # radius that must not touch the true world
+expect = "route"             # or an error: EnclosedError, NonFreeError, UnknownSpaceError, ...
+# reason = "enclosed"        # regular expression that matches in the message of the error
 # unknown = "allow"          # unknown and contested space: avoid, allow or penalise
-# time_limit = 2.0           # search time
-# settings = {{ weight = 1 }}  # of the planner
-max_ratio = 1.1              # to the best route in the true world
+# time_limit = 2.0           # time limit of planning
+# settings = {{ weight = 1 }}  # settings of the planner
+max_ratio = 1.1              # most length, divided by that of the best route in the true world
 
-[bounds]                     # min, max, or both, for any figure that a run prints
+[bounds]                     # min, max, or both, for any figure that `scenario run` prints
 free_recall = {{ min = 0.9 }}
 false_free_beyond = {{ max = 0.01 }}
 '''
 
 
 def write_template(place: Path, name: str, kinds: list[str]) -> Path:
-    """Write a commented scenario into a new folder of a place, and return its file.
+    """Write a commented scenario to a new folder, and return the path of its file.
+
+    Parameters
+    ----------
+    place : Path
+        Parent of the new folder.
+    name : str
+        Name of the new folder.
+    kinds : list of str
+        Kinds of worlds, listed in a comment.
 
     Raises
     ------
     FileFormatError
-        There is a scenario already.
+        The folder contains a scenario already.
     InputError
-        A name that is no single folder's.
+        The name is not that of a single folder.
     """
     folder = place / name
     if folder.name != name or name in ("", ".", ".."):

@@ -1,4 +1,4 @@
-"""What a check of motions is measured against, and what the measurement says."""
+"""The benchmark of motion checks: the Python lambda, the rows, and the command."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ def test_a_lambda_and_the_compiled_check_mostly_agree(footprint: Any, space: str
         assert row["motions_per_s"] > 0.0
 
 
-class Posed:
-    """Reads as a state of OMPL's does."""
+class State:
+    """Has the interface of a state of OMPL."""
 
     def __init__(self, *pose: float) -> None:
         self.pose = pose
@@ -78,18 +78,18 @@ def test_the_lambda_is_right_about_states(footprint: Any, space: Any) -> None:
     validator = MotionValidator(Costmap.of(problem), space, 1.0)
     is_valid, rng = lambda_of(validator), np.random.default_rng(0)
     high = np.array(validator.costmap.blocked.shape[::-1]) * SIZE
-    told = []
+    results = []
     for _ in range(300):
         state = (*rng.uniform(0.0, high).tolist(), rng.uniform(-math.pi, math.pi))
         own = state[:2] if space == "r2" else state
-        told.append((is_valid(Posed(*state)), validator.is_clear(*own, *own)))
-        assert isinstance(told[-1][0], bool)
-    agree = np.mean([said == clear for said, clear in told])
+        results.append((is_valid(State(*state)), validator.is_clear(*own, *own)))
+        assert isinstance(results[-1][0], bool)
+    agree = np.mean([valid == clear for valid, clear in results])
     assert agree >= (1.0 if space == "r2" else 0.95)  # a corner of a cell fits between two points
 
 
 def test_queries_that_have_no_route_are_not_measured() -> None:
-    with pytest.raises(ProblemError, match=r"queries: expected one that may have a route, got"):
+    with pytest.raises(ProblemError, match=r"queries: expected one that can have a route, got"):
         compare_motions(walls(), footprint=0.0, queries=QUERIES[1:], seeds=1)
 
 
@@ -113,7 +113,7 @@ def test_the_command_prints_rows_of_both_checks(tmp_path: Path) -> None:
     assert "motions, se2: compiled" in shown.out
 
 
-def test_the_command_takes_no_voxels(tmp_path: Path) -> None:
+def test_the_command_refuses_voxels(tmp_path: Path) -> None:
     (tmp_path / "cube.3dmap").write_text("voxel 4 4 4\n1 1 1\n")
     scen = tmp_path / "cube.3dmap.3dscen"
     scen.write_text("version 1\ncube.3dmap\n0 0 0 3 3 3 5.2 1.0\n")

@@ -1,4 +1,4 @@
-"""Sampling planners side by side: their queries, attempts, figures, and the command."""
+"""The comparison of sampling planners: queries, attempts, figures, and the command."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ from planners.sampling.ompl_module import samplers
 from planners.sampling.settings import StateSpace
 
 PLANE: tuple[StateSpace, ...] = ("r2", "se2", "dubins", "reeds_shepp")
-BETTERS = ((0.1, 30.0), (0.3, 24.0), (0.5, 22.0), (0.9, 20.0))  # seconds and costs
+IMPROVEMENTS = ((0.1, 30.0), (0.3, 24.0), (0.5, 22.0), (0.9, 20.0))  # seconds and costs
 needs_ompl = pytest.mark.skipif(not samplers(), reason="ompl is not installed")
 
 
@@ -50,9 +50,9 @@ def made() -> dict[str, Cases]:
     return {name: make() for name, make in WORKLOADS.items()}
 
 
-def tried(planner: str, cases: Cases, space: StateSpace = "r2", **told: Any) -> Attempt:
-    asked: dict[str, Any] = {"seed": 0, "time_limit": 30.0, "improve_for": 0.2}
-    return run_once(cases[space], planner, space, **(asked | told))
+def attempt_once(planner: str, cases: Cases, space: StateSpace = "r2", **options: Any) -> Attempt:
+    defaults: dict[str, Any] = {"seed": 0, "time_limit": 30.0, "improve_for": 0.2}
+    return run_once(cases[space], planner, space, **(defaults | options))
 
 
 # Queries
@@ -105,9 +105,7 @@ def test_the_door_is_lower_than_the_halls(made: dict[str, Cases]) -> None:
 
 
 @pytest.mark.parametrize(("radius", "passes"), [(0.49, True), (0.51, False)])
-def test_the_door_is_as_wide_as_it_says(
-    radius: float, passes: bool, made: dict[str, Cases]
-) -> None:
+def test_the_door_is_one_metre_wide(radius: float, passes: bool, made: dict[str, Cases]) -> None:
     costmap = Costmap.of(made["doorway"]["r2"].problem)
     through = costmap.clearance_of(np.array([(8.0, 5.5), (12.0, 5.5)]))
     assert (through >= radius) == passes
@@ -117,7 +115,7 @@ def test_the_door_is_as_wide_as_it_says(
     boxes=st.lists(st.tuples(*[st.floats(0.0, 6.0)] * 4), min_size=1, max_size=3),
     resolution=st.sampled_from([0.3, 0.5]),
 )
-def test_a_cell_is_blocked_if_anything_but_what_is_free_reaches_into_it(
+def test_a_cell_is_free_if_it_lies_in_the_free_space(
     boxes: list[tuple[float, ...]], resolution: float
 ) -> None:
     outer = shapely.box(0.0, 0.0, 6.0, 4.5)
@@ -156,7 +154,7 @@ def test_on_a_map_start_and_goal_lie_far_apart_in_the_largest_region(tmp_path: P
     assert again.start == cases["r2"].problem.start
 
 
-def test_where_the_footprint_fits_nowhere_there_is_no_query(tmp_path: Path) -> None:
+def test_a_footprint_that_fits_nowhere_is_refused(tmp_path: Path) -> None:
     file = drawn(tmp_path, "...", ".@.", "...")
     with pytest.raises(ProblemError, match=r"map: expected a place for a .* 2\.00 m, got none"):
         cases_on(file, 2.0, turning_radius=1.0)
@@ -176,9 +174,9 @@ def test_maps_are_found_at_any_depth(tmp_path: Path) -> None:
 
 
 @needs_ompl
-def test_an_attempt_notes_when_a_route_came_and_how_it_got_better(made: dict[str, Cases]) -> None:
-    attempt = tried("rrtstar", made["doorway"])
-    times, costs = zip(*attempt.betters, strict=True)
+def test_an_attempt_records_the_times_and_costs_of_its_improvements(made: dict[str, Cases]) -> None:
+    attempt = attempt_once("rrtstar", made["doorway"])
+    times, costs = zip(*attempt.improvements, strict=True)
     assert attempt.solved
     assert list(times) == sorted(times)
     assert list(costs) == sorted(costs, reverse=True)
@@ -187,17 +185,17 @@ def test_an_attempt_notes_when_a_route_came_and_how_it_got_better(made: dict[str
 
 
 @needs_ompl
-def test_an_attempt_costs_what_the_route_that_is_handed_out_costs(made: dict[str, Cases]) -> None:
-    attempt = tried("rrtconnect", made["doorway"], seed=3)
+def test_the_cost_of_an_attempt_is_that_of_the_returned_route(made: dict[str, Cases]) -> None:
+    attempt = attempt_once("rrtconnect", made["doorway"], seed=3)
     route = plan(made["doorway"]["r2"].problem, "rrtconnect", space="r2", seed=3)
     assert attempt.cost == pytest.approx(route.length, abs=1e-9)
 
 
 @needs_ompl
-def test_an_attempt_without_a_route_says_why(made: dict[str, Cases]) -> None:
-    attempt = tried("rrtconnect", made["rooms"], time_limit=0.0)
+def test_an_attempt_without_a_route_has_a_reason(made: dict[str, Cases]) -> None:
+    attempt = attempt_once("rrtconnect", made["rooms"], time_limit=0.0)
     assert not attempt.solved
-    assert attempt.betters == ()
+    assert attempt.improvements == ()
     assert attempt.reason.startswith("TimeLimitError: rrtconnect: ")
 
 
@@ -212,12 +210,12 @@ def test_the_shortest_route_bends_once_at_each_side_of_the_door(made: dict[str, 
     assert found == pytest.approx(legs.sum() + 0.2, rel=5e-4)
 
 
-def test_where_no_disc_passes_nobody_knows_the_shortest(made: dict[str, Cases]) -> None:
+def test_where_no_disc_passes_there_is_no_shortest_route(made: dict[str, Cases]) -> None:
     problem, settings = made["doorway"]["se2"]  # the disc around the cart is wider than the door
     assert shortest(Case(problem, settings)) is None
 
 
-# Processes: what they do is here, in a module that they can import
+# Processes: their functions are in this module, which they can import
 
 
 def halved(number: int) -> float:
@@ -233,14 +231,14 @@ def failed(task: int, reason: str) -> float:
     return float("nan")
 
 
-def test_what_crashes_loses_its_own_task_only() -> None:
+def test_a_crash_loses_one_task() -> None:
     done = dict(worker_pool([1, -3, 2, 4], halved, jobs=2, patience=60.0, lost=failed))
     assert np.isnan(done.pop(-3))
     assert done == {1: 0.5, 2: 1.0, 4: 2.0}
     assert multiprocessing.active_children() == []
 
 
-def test_what_hangs_is_ended() -> None:
+def test_a_worker_that_hangs_is_killed() -> None:
     [(task, result)] = worker_pool([0], halved, jobs=2, patience=1.0, lost=failed)
     assert task == 0
     assert np.isnan(result)
@@ -264,7 +262,7 @@ def test_an_interrupt_ends_all_processes() -> None:
 # Figures
 
 
-def test_seeds_take_turns_and_what_is_refused_is_not_tried() -> None:
+def test_trials_are_ordered_by_seed_and_leave_out_refused_planners() -> None:
     names = ["rrtconnect", "prm", "aorrtc"]
     trials, refused = list_trials(
         [Workload("parking")], names, ["r2", "dubins", "r3"],
@@ -284,15 +282,17 @@ def race(*attempts: Attempt, space: StateSpace = "r2") -> Race:
     return Race("doorway", space, "rrtstar", list(attempts))
 
 
-def found(*betters: tuple[float, float]) -> Attempt:
-    return Attempt(betters[-1][0] + 0.1, betters)
+def solved(*improvements: tuple[float, float]) -> Attempt:
+    return Attempt(improvements[-1][0] + 0.1, improvements)
 
 
 GAVE_UP = Attempt(10.0, reason="TimeLimitError: too late.")
 
 
-def test_figures_count_what_was_solved_and_say_why_others_were_not() -> None:
-    one = row(race(found(*BETTERS), found((0.3, 30.0)), GAVE_UP), Optimum(20.0, is_best_known=True))
+def test_figures_count_solved_attempts_and_give_a_reason_for_the_others() -> None:
+    one = row(
+        race(solved(*IMPROVEMENTS), solved((0.3, 30.0)), GAVE_UP), Optimum(20.0, is_best_known=True)
+    )
     curve, counts = one.pop("curve"), {key: one[key] for key in ("queries", "solved")}
     assert counts == {"queries": 3, "solved": 2}
     assert one["success"] == pytest.approx(2 / 3)
@@ -303,7 +303,7 @@ def test_figures_count_what_was_solved_and_say_why_others_were_not() -> None:
     assert curve[-1] == [pytest.approx(0.6), 1.5]  # of three seeds, the median is the second
 
 
-def test_who_finds_nothing_has_no_figures_but_the_time_lost() -> None:
+def test_a_planner_without_a_route_has_only_times() -> None:
     one = row(race(GAVE_UP, lost_one()), Optimum(None, is_best_known=True))
     empty = ("first_ms", "first_p95_ms", "cost", "optimum", "ratio")
     assert [one[key] for key in empty] == [None] * 5
@@ -317,24 +317,24 @@ def lost_one() -> Attempt:
     return lost_attempt(trials[0], "its process ended with -11")
 
 
-def test_costs_are_held_against_the_shortest_or_the_best_known(made: dict[str, Cases]) -> None:
+def test_costs_are_compared_with_the_shortest_or_the_best_known(made: dict[str, Cases]) -> None:
     work, known = Workload("doorway"), shortest(made["doorway"]["r2"])
     assert known is not None
-    races = [race(found((1.0, 30.0))), race(found((1.0, 29.0)), GAVE_UP, space="se2")]
+    races = [race(solved((1.0, 30.0))), race(solved((1.0, 29.0)), GAVE_UP, space="se2")]
     assert optima([work], races) == {
         ("doorway", "r2"): Optimum(known, is_best_known=False),
         ("doorway", "se2"): Optimum(29.0, is_best_known=True),
     }
-    better = optima([work], [race(found((1.0, known - 0.1)))])
+    better = optima([work], [race(solved((1.0, known - 0.1)))])
     assert better["doorway", "r2"] == Optimum(known - 0.1, is_best_known=True)
     nothing = optima([work], [race(GAVE_UP, space="se2")])
     assert nothing["doorway", "se2"].cost is None
 
 
-def bettering() -> st.SearchStrategy[Attempt]:
+def improving_attempts() -> st.SearchStrategy[Attempt]:
     steps = st.tuples(st.floats(0.01, 1.0), st.floats(0.5, 1.0))
     return st.lists(steps, min_size=FINDS + 1, max_size=8).map(
-        lambda steps: found(
+        lambda steps: solved(
             *zip(
                 np.cumsum([wait for wait, _ in steps]).tolist(),
                 (50.0 * np.cumprod([share for _, share in steps])).tolist(),
@@ -344,10 +344,8 @@ def bettering() -> st.SearchStrategy[Attempt]:
     )
 
 
-@given(won=st.lists(bettering(), min_size=1, max_size=7), failures=st.integers(0, 3))
-def test_a_curve_is_the_median_of_what_each_seed_had_by_then(
-    won: list[Attempt], failures: int
-) -> None:
+@given(won=st.lists(improving_attempts(), min_size=1, max_size=7), failures=st.integers(0, 3))
+def test_a_curve_is_the_median_of_the_best_costs_so_far(won: list[Attempt], failures: int) -> None:
     curve = progress(race(*won, *[GAVE_UP] * failures), 10.0)
     if len(won) <= failures:
         assert len(curve) == 1
@@ -357,7 +355,7 @@ def test_a_curve_is_the_median_of_what_each_seed_had_by_then(
     assert list(ratios) == sorted(ratios, reverse=True)
     for moment, ratio in curve[:-1]:
         had = [
-            min((cost for time, cost in one.betters if time <= moment), default=np.inf)
+            min((cost for time, cost in one.improvements if time <= moment), default=np.inf)
             for one in won
         ]
         assert ratio == pytest.approx(np.median([*had, *[np.inf] * failures]) / 10.0)
@@ -368,13 +366,13 @@ def test_a_curve_is_the_median_of_what_each_seed_had_by_then(
 
 def test_long_curves_are_thinned() -> None:
     steps = [(0.001 * i, 100.0 / i) for i in range(1, 2000)]
-    curve = progress(race(found(*steps)), 0.05)
+    curve = progress(race(solved(*steps)), 0.05)
     assert MOMENTS / 2 < len(curve) <= MOMENTS + 1
     assert curve[0] == (0.001, 2000.0)
 
 
-def test_who_stops_at_the_first_route_is_a_point() -> None:
-    one, other = found((0.2, 30.0), (0.3, 25.0)), found((0.4, 27.0), (0.5, 21.0))
+def test_a_planner_that_stops_at_the_first_route_is_a_point() -> None:
+    one, other = solved((0.2, 30.0), (0.3, 25.0)), solved((0.4, 27.0), (0.5, 21.0))
     assert progress(race(one, other), 20.0) == [(0.4, 1.15)]
 
 
@@ -384,7 +382,7 @@ QUICK = ("--seeds", "2", "--improve-for", "0.1", "--jobs", "1", "--space", "r2")
 
 
 @needs_ompl
-def test_the_command_lets_planners_compete_and_draws_them(tmp_path: Path) -> None:
+def test_the_command_compares_planners_and_draws_them(tmp_path: Path) -> None:
     picture = tmp_path / "race.png"
     planners = [
         word for name in ("rrtconnect", "rrtstar", "aorrtc") for word in ("--planner", name)
@@ -408,7 +406,7 @@ def test_the_command_lets_planners_compete_and_draws_them(tmp_path: Path) -> Non
 
 
 @needs_ompl
-def test_the_table_says_who_solved_what_on_a_map_and_who_failed_why(tmp_path: Path) -> None:
+def test_the_table_has_solutions_on_a_map_and_reasons_of_refusals(tmp_path: Path) -> None:
     file = drawn(tmp_path, *(["." * 20] * 12))
     ran = groundmap(
         "bench", "planning", "--samplers", "--map", file, "--planner", "rrt", "--planner",
@@ -436,16 +434,14 @@ def test_the_table_says_who_solved_what_on_a_map_and_who_failed_why(tmp_path: Pa
         (["--movingai", "maps"], "expected --movingai or --samplers, got both"),
     ],
 )
-def test_what_is_asked_wrongly_is_refused_before_anything_runs(
-    options: list[str], message: str
-) -> None:
+def test_bad_options_are_refused_before_anything_runs(options: list[str], message: str) -> None:
     ran = groundmap("bench", "planning", "--samplers", *options)
     assert ran.code == 2
     assert message in ran.err
     assert ran.out == ""
 
 
-def test_published_queries_are_put_to_one_planner_at_a_time() -> None:
+def test_published_queries_are_run_with_one_planner_at_a_time() -> None:
     ran = groundmap(
         "bench", "planning", "--movingai", "maps", "--planner", "jps", "--planner", "astar"
     )

@@ -1,4 +1,4 @@
-"""The benchmarks, and the command that runs them."""
+"""The MovingAI benchmark: workloads, answers, figures, and the command."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_workloads_are_found_at_any_depth_and_named_by_their_maps(tmp_path: Path
     assert (alone.name, len(alone.queries)) == ("room.map", len(ROWS))
 
 
-def test_a_limit_takes_queries_from_all_over_the_file(tmp_path: Path) -> None:
+def test_a_limit_selects_evenly_spaced_queries(tmp_path: Path) -> None:
     room(tmp_path, *(f"{i} room.map 4 3 0 0 0 0 0" for i in range(100)))
     lines = [query.line for query in find_workloads(tmp_path, limit=4)[0].queries]
     assert lines == [2, 35, 68, 101]
@@ -143,30 +143,32 @@ def test_an_answer_agrees_within_a_hundredth_of_a_cell(
     assert answer.agrees == agrees
 
 
-def test_a_planner_of_any_angle_may_cut_short(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_any_angle_lengths_can_be_shorter_than_published(monkeypatch: pytest.MonkeyPatch) -> None:
     blocked = np.zeros((5, 5), dtype=bool)
     query = MovingAIQuery(Path(), (5, 5), (0, 0), (1, 3), 2.0 + DIAGONAL, 0)
     engine = straight(bound=None)
     for planner, agrees in (("theta", True), ("crow", False)):
         monkeypatch.setitem(PLANNERS, planner, Planner(engine, PLANNERS["astar"].settings))
         assert (
-            BenchmarkRunner(BlockedMap(blocked, blocked, 1.0, (0, 0)), planner).ask(query).agrees
+            BenchmarkRunner(BlockedMap(blocked, blocked, 1.0, (0, 0)), planner).run(query).agrees
             == agrees
         )
 
 
 @pytest.mark.parametrize(("bound", "agrees"), [(1.0, False), (1.5, True), (1.2, False)])
-def test_a_bound_is_granted(monkeypatch: pytest.MonkeyPatch, bound: float, agrees: bool) -> None:
+def test_a_length_within_the_bound_agrees(
+    monkeypatch: pytest.MonkeyPatch, bound: float, agrees: bool
+) -> None:
     engine = straight(bound=bound, detour=2.0)
     monkeypatch.setitem(PLANNERS, "drifter", Planner(engine, PLANNERS["astar"].settings))
     blocked = np.zeros((5, 5), dtype=bool)
     query = MovingAIQuery(Path(), (5, 5), (0, 0), (0, 4), 4.0, 0)
     runner = BenchmarkRunner(BlockedMap(blocked, blocked, 1.0, (0, 0)), "drifter")
-    assert runner.ask(query).agrees == agrees
+    assert runner.run(query).agrees == agrees
 
 
 @pytest.mark.parametrize("changes", [{"headings": np.zeros(3)}, {"bound": None}])
-def test_planners_whose_lengths_mean_something_else_are_refused(
+def test_planners_whose_lengths_are_not_comparable_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changes: dict[str, Any]
 ) -> None:
     engine = straight(**changes)
@@ -175,7 +177,7 @@ def test_planners_whose_lengths_mean_something_else_are_refused(
         answers(room(tmp_path), "curler")
 
 
-def test_planners_that_want_a_heading_are_refused(
+def test_planners_that_need_a_heading_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     class Curler:
@@ -205,7 +207,7 @@ def straight(*, detour: float = 0.0, **changes: Any) -> Any:
     return Straight
 
 
-def test_voxels_are_for_astar(tmp_path: Path) -> None:
+def test_voxels_are_supported_by_astar_only(tmp_path: Path) -> None:
     with pytest.raises(ProblemError, match="planner: expected 'astar', on voxels, got 'dijkstra'"):
         answers(block(tmp_path), "dijkstra")
 
@@ -262,14 +264,14 @@ def test_mismatches_are_named_and_exit_with_1(tmp_path: Path) -> None:
         (["--movingai", "nowhere"], "nowhere: expected a folder, or a .scen, got nothing of that"),
     ],
 )
-def test_what_is_asked_wrongly_is_refused_in_a_sentence(options: list[str], message: str) -> None:
+def test_bad_options_are_refused(options: list[str], message: str) -> None:
     ran = groundmap("bench", "planning", *options)
     assert ran.code == 2
     assert message in ran.err
     assert ran.out == ""
 
 
-def test_a_planner_that_is_none_is_refused(tmp_path: Path) -> None:
+def test_an_unknown_planner_is_refused(tmp_path: Path) -> None:
     ran = groundmap("bench", "planning", "--movingai", room(tmp_path), "--planner", "teleport")
     assert ran.code == 2
     assert "planner: expected one of " in ran.err

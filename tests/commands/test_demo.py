@@ -57,7 +57,7 @@ def grid(ran: Ran) -> ConfidenceGrid:
     return ConfidenceGrid.load(ran.json["map"])
 
 
-def test_the_demo_ends_well_and_says_so_in_json(ran: Ran, folder: Path) -> None:
+def test_the_demo_exits_with_0_and_a_summary_in_json(ran: Ran, folder: Path) -> None:
     assert ran.code == 0
     result = ran.json
     assert result["views"] == len(FolderLog(DATA))
@@ -67,13 +67,13 @@ def test_the_demo_ends_well_and_says_so_in_json(ran: Ran, folder: Path) -> None:
     assert [result[key] for key in ("map", "picture", "route")] == [str(folder / f) for f in FILES]
 
 
-def test_it_writes_three_files_and_no_more(ran: Ran, folder: Path) -> None:
+def test_it_writes_exactly_three_files(ran: Ran, folder: Path) -> None:
     assert ran.code == 0
     assert sorted(path.name for path in folder.iterdir()) == FILES
     assert (folder / "map.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_the_route_goes_through_the_doorway_and_hits_nothing(ran: Ran, courtyard: Any) -> None:
+def test_the_route_passes_the_doorway_without_collision(ran: Ran, courtyard: Any) -> None:
     feature = json.loads(Path(ran.json["route"]).read_text())
     line = shapely.LineString(feature["geometry"]["coordinates"])
     assert line.crosses(shapely.LineString(courtyard.DOOR))
@@ -81,9 +81,7 @@ def test_the_route_goes_through_the_doorway_and_hits_nothing(ran: Ran, courtyard
     assert shapely.distance(line, truth) > 0.2  # by the map it is 0.35 m, of noisy features
 
 
-def test_no_free_space_leads_through_the_walls_but_by_the_doorway(
-    grid: ConfidenceGrid, courtyard: Any
-) -> None:
+def test_the_halves_are_connected_by_the_doorway_only(grid: ConfidenceGrid, courtyard: Any) -> None:
     free, centres = _free_cells(grid)
     assert _joined(free, centres, (3.0, 3.4), (20.5, 2.5))
     (x, y0), (_, y1) = courtyard.DOOR
@@ -92,7 +90,7 @@ def test_no_free_space_leads_through_the_walls_but_by_the_doorway(
     assert not _joined(free & ~door, centres, (3.0, 3.4), (20.5, 2.5))
 
 
-def test_the_map_is_true_to_the_courtyard(grid: ConfidenceGrid, courtyard: Any) -> None:
+def test_the_map_agrees_with_the_courtyard(grid: ConfidenceGrid, courtyard: Any) -> None:
     free, centres = _free_cells(grid)
     points = shapely.points(centres)
     truth = _obstacles(courtyard)
@@ -104,7 +102,7 @@ def test_the_map_is_true_to_the_courtyard(grid: ConfidenceGrid, courtyard: Any) 
     assert free[shapely.distance(yard, points) > WALL_NOISE].mean() < 0.01
 
 
-def test_the_map_measures_up_to_what_could_be_seen(grid: ConfidenceGrid, courtyard: Any) -> None:
+def test_the_map_has_most_of_the_visible_space(grid: ConfidenceGrid, courtyard: Any) -> None:
     window = grid.window()
     truth = truth_of(
         courtyard.COURTYARD, courtyard.moves(), courtyard.SENSOR, window, MapperSettings()
@@ -118,7 +116,7 @@ def test_the_map_measures_up_to_what_could_be_seen(grid: ConfidenceGrid, courtya
     assert measures.boundary_p95 < 1.0  # [m], what stereo tells the range of a wall 12 m away to
 
 
-def test_the_log_is_what_the_generator_makes(courtyard: Any) -> None:
+def test_the_bundled_log_equals_the_generated_one(courtyard: Any) -> None:
     with np.load(DATA / "features.npz", allow_pickle=False) as shipped:
         for kind, rows in courtyard.tables(courtyard.views()).items():
             assert shipped[kind].dtype == np.float32
@@ -156,7 +154,7 @@ def test_the_commands_it_suggests_work(ran: Ran) -> None:
     assert [run(*command[1:]).code for command in commands] == [0, 0, 0]
 
 
-def test_people_get_a_summary_and_what_to_try_next(
+def test_the_output_has_a_summary_and_commands_to_try(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -167,7 +165,7 @@ def test_people_get_a_summary_and_what_to_try_next(
     assert sorted(path.name for path in (tmp_path / "groundmap-demo").iterdir()) == FILES
 
 
-def test_a_folder_that_can_not_be_made_is_refused_before_the_work(tmp_path: Path) -> None:
+def test_a_folder_that_can_not_be_created_is_refused_before_mapping(tmp_path: Path) -> None:
     ran = run("demo", "--out", tmp_path / "not" / "there")
     assert (ran.code, ran.out) == (2, "")
     assert "expected a file in a folder that exists" in ran.err

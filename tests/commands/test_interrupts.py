@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: one line, an exit code, and nothing left behind, whenever they come."""
+"""Ctrl-C and SIGTERM at any time: one line, an exit code, and no leftovers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from command_line import run
 from groundmap import read_views, write_views
 
 MAIN = "from planners.cli import main; main()"
-# Stops at a moment of the import that no clock has to find.
+# Stops at a certain import, without a dependence on time.
 DURING_IMPORT = """
 import builtins, sys
 from planners.cli import main
@@ -37,7 +37,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals are POS
 
 
 def start(*arguments: str | Path, script: str = MAIN) -> subprocess.Popen[str]:
-    """Start the command in a session of its own."""
+    """Start the command in a new session."""
     return subprocess.Popen(
         [sys.executable, "-c", script, *map(str, arguments)],
         stdout=subprocess.PIPE,
@@ -53,7 +53,7 @@ def others_in_session(leader: int) -> list[int]:
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             fields = (folder / "stat").read_text().rpartition(")")[2].split()
-        except OSError:  # it has ended since
+        except OSError:  # it has ended in the meantime
             continue
         if int(fields[3]) == leader and fields[0] != "Z" and int(folder.name) != leader:
             found.append(int(folder.name))
@@ -64,7 +64,7 @@ def check_ended(process: subprocess.Popen[str], number: signal.Signals, word: st
     out, err = process.communicate(timeout=60)
     lines = [line for line in err.splitlines() if "running scenarios" not in line]
     assert (process.returncode, lines, out) == (128 + number, [f"groundmap: {word}"], "")
-    while others_in_session(process.pid):  # killed, or about to find that nobody is left
+    while others_in_session(process.pid):  # killed, or about to end without a parent
         time.sleep(0.05)
 
 
@@ -107,7 +107,7 @@ def test_workers_end_with_the_command(number: signal.Signals, word: str, tmp_pat
     for name in ("one", "two"):
         assert run("scenario", "new", name, "--folder", tmp_path).code == 0
     process = start("scenario", "run", tmp_path, "--jobs", "2")
-    while len(others_in_session(process.pid)) < 3:  # two workers, and what tracks their resources
+    while len(others_in_session(process.pid)) < 3:  # two workers and the resource tracker
         assert process.poll() is None
         time.sleep(0.02)
     if number == signal.SIGINT:

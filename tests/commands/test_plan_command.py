@@ -15,7 +15,7 @@ from PIL import Image
 from command_line import Ran, run
 from groundmap import ConfidenceGrid
 from planners import OWN_PLANNERS, max_curvature
-from planners.commands.console import patiently
+from planners.commands.console import show_waiting
 
 
 @pytest.fixture(scope="session")
@@ -56,7 +56,7 @@ def test_all_planners_are_compared(wall: Path, tmp_path: Path) -> None:
         assert min(image.size) > 300
 
 
-def test_a_planner_that_can_not_is_named_and_the_others_go_on(wall: Path) -> None:
+def test_a_planner_that_refuses_the_problem_is_named_and_the_others_continue(wall: Path) -> None:
     ran = plan(wall, "--planner", "all", "--clearance-weight", "2")
     assert ran.code == 0
     assert set(ran.json["routes"]) | set(ran.json["refused"]) == set(OWN_PLANNERS)
@@ -70,7 +70,7 @@ def test_a_planner_that_can_not_is_named_and_the_others_go_on(wall: Path) -> Non
     assert "jps: planner: expected uniform costs" in table.out
 
 
-def test_where_no_planner_finds_a_route_the_reason_is_said(wall: Path) -> None:
+def test_without_any_route_the_reason_is_reported(wall: Path) -> None:
     ran = plan(wall, "--planner", "all", footprint="1.2")
     assert ran.code == 3
     assert "the footprint needs 2.40 m" in ran.json["reason"]
@@ -83,14 +83,14 @@ def test_settings_reach_the_planner(wall: Path) -> None:
     assert "Did you mean 'weight'?" in ran.json["reason"]
 
 
-def test_clearance_can_be_worth_a_longer_way(wall: Path) -> None:
+def test_a_clearance_weight_gives_a_longer_route(wall: Path) -> None:
     plain, wide = plan(wall), plan(wall, "--clearance-weight", "5", "--inflation-radius", "1.5")
     assert wide.json["length"] > plain.json["length"]
     assert wide.json["mean_clearance"] > plain.json["mean_clearance"]
     assert wide.json["cost"] > wide.json["length"]
 
 
-def test_a_car_goes_where_its_outline_goes(wall: Path, tmp_path: Path) -> None:
+def test_a_car_passes_where_its_outline_fits(wall: Path, tmp_path: Path) -> None:
     outline = "-0.6,-0.8 2.4,-0.8 2.4,0.8 -0.6,0.8"
     ends = {"start": "4,9,0", "goal": "24,9,0"}
     assert plan(wall, footprint=outline, **ends).code == 3
@@ -106,7 +106,7 @@ def test_a_car_goes_where_its_outline_goes(wall: Path, tmp_path: Path) -> None:
     assert picture.is_file()
 
 
-def test_a_route_can_be_pulled_tight_and_rounded(wall: Path) -> None:
+def test_a_route_can_be_shortened_and_rounded(wall: Path) -> None:
     plain, tight = plan(wall), plan(wall, "--shortcut")
     assert tight.json["length"] < plain.json["length"] - 0.5
     rounded = plan(wall, "--smooth", "1.0")
@@ -159,16 +159,16 @@ def test_a_voxel_map_can_be_planned_on(tmp_path: Path) -> None:
     assert "planner: expected one that supports 3-D maps: astar, auto" in ran.json["reason"]
 
 
-def test_what_takes_long_is_spoken_of(capsys: pytest.CaptureFixture[str]) -> None:
-    with patiently("counting stars", every=0.01):
+def test_a_long_wait_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
+    with show_waiting("counting stars", every=0.01):
         time.sleep(0.3)
     assert capsys.readouterr().err.startswith("counting stars ...\n")
-    with patiently("counting cows", every=60.0):
+    with show_waiting("counting cows", every=60.0):
         pass
     assert capsys.readouterr().err == ""
 
 
-def test_nothing_is_written_over_what_the_map_is_made_of(tmp_path: Path) -> None:
+def test_the_files_of_the_map_are_not_overwritten(tmp_path: Path) -> None:
     image = tmp_path / "hall.png"
     Image.fromarray(np.full((40, 60), 254, dtype=np.uint8)).save(image)
     (tmp_path / "hall.yaml").write_text(
@@ -196,26 +196,26 @@ def test_a_ros_path_has_no_references(wall: Path, tmp_path: Path) -> None:
     assert "&id" not in out.read_text()
 
 
-def test_a_setting_may_be_the_time_limit(wall: Path) -> None:
+def test_the_time_limit_can_be_a_setting(wall: Path) -> None:
     assert plan(wall, "--set", "time_limit=none").code == 0
     ran = plan(wall, "--time-limit", "5", "--set", "time_limit=0")
     assert (ran.code, ran.json["error"]) == (3, "TimeLimitError")
 
 
-def test_what_is_no_setting_is_refused_by_its_name(wall: Path) -> None:
+def test_an_unknown_setting_is_refused_by_its_name(wall: Path) -> None:
     ran = plan(wall, "--set", "planner=jps")
     assert ran.code == 2
     assert "planner: expected a setting of AStarSettings, got an unknown key" in ran.err
 
 
 @pytest.mark.parametrize("option", [["--shortcut"], ["--smooth", "1"], ["--set", "weight=2"]])
-def test_what_is_for_one_planner_is_refused_for_all(wall: Path, option: list[str]) -> None:
+def test_options_for_one_planner_are_refused_with_all(wall: Path, option: list[str]) -> None:
     ran = plan(wall, "--planner", "all", *option)
     assert ran.code == 2
     assert "--out, --set, --shortcut and --smooth are for one planner, not all" in ran.err
 
 
-def test_where_all_planners_refuse_the_problem_the_first_says_why(tmp_path: Path) -> None:
+def test_if_all_planners_refuse_the_problem_the_first_reason_is_reported(tmp_path: Path) -> None:
     grid = ConfidenceGrid(resolution=0.5, origin=(0, 0, 0))
     grid.fuse(np.array([0, 0, 0]), np.full((16, 16, 16), -1.0, dtype=np.float32))
     grid.save(tmp_path / "solid.npz")

@@ -84,7 +84,7 @@ def test_a_ray_sets_all_cells_that_it_crosses_and_none_that_it_does_not_touch(
 
 
 @given(st.integers(0, 2**32 - 1).map(np.random.default_rng))
-def test_the_kernel_does_what_its_slow_twin_does(rng: np.random.Generator) -> None:
+def test_the_kernel_equals_a_slow_implementation(rng: np.random.Generator) -> None:
     origin, *ends = rng.uniform(0.0, SIZE, (6, 2))
     twins = [cut_at_borders(origin, end) for end in ends]
     np.testing.assert_array_equal(cast(origin, *ends), np.min(twins, axis=0))
@@ -113,18 +113,18 @@ def test_many_rays_through_a_cell_are_one_update() -> None:
     assert caster.grid.window().count.max() == 1
 
 
-def test_of_a_segment_both_ends_are_seen() -> None:
+def test_both_ends_of_a_segment_are_features() -> None:
     grid = mapped(view_of(segments=[[(4.1, 1.1, 0.5), (4.1, -1.1, 0.5)]])).grid
     np.testing.assert_array_equal(
         grid.confidence_at([(4.1, 1.1), (4.1, -1.1), (4.1, 0.1)]), [1.0, 1.0, 0.0]
     )
 
 
-def test_a_view_without_features_says_nothing_beyond_its_own_place() -> None:
+def test_a_view_without_features_observes_only_its_own_cell() -> None:
     assert not mapped(view_of()).grid.window((-2.0, -2.0, 2.0, 2.0)).confidence.any()
 
 
-def test_a_drop_off_is_counted_as_the_mapper_counts_it() -> None:
+def test_drop_offs_are_counted_as_by_the_mapper() -> None:
     view = view_of((4.1, 0.1, -1.0))
     mapper = GroundMapper(**mapped(view).settings.model_dump())
     mapper.integrate(view)

@@ -1,4 +1,4 @@
-"""Why one triangulates: what the comparison with the ray caster must show, on four rooms."""
+"""The comparison with the ray caster on four rooms."""
 
 from __future__ import annotations
 
@@ -46,28 +46,28 @@ def margins(curves: Curves) -> dict[str, float]:
     }
 
 
-def test_the_fan_finds_what_takes_several_times_as_many_rays(curves: Curves) -> None:
+def test_the_fan_finds_more_than_several_times_as_many_rays(curves: Curves) -> None:
     assert min(margins(curves).values()) > 0.01, margins(curves)
 
 
 @pytest.mark.parametrize("settings", BROKEN.values(), ids=BROKEN)
-def test_a_fan_that_fills_no_gaps_does_not(settings: dict[str, Any]) -> None:
+def test_a_fan_that_fills_no_gaps_finds_less(settings: dict[str, Any]) -> None:
     broken = margins(compare_recall(rooms=1, seed=2, **settings))
     assert max(broken.values()) < -0.02, broken
 
 
-def test_of_what_rays_claim_more_is_false(curves: Curves) -> None:
+def test_rays_have_more_false_freespace(curves: Curves) -> None:
     # Rays pass over low boxes; the fan ends at the nearest surface.
     for count in (300, 900):
         assert at(curves.rays, count)[1] > 1.5 * at(curves.points, count)[1]
 
 
-def test_behind_boxes_as_high_as_the_camera_the_fan_claims_nothing() -> None:
+def test_the_fan_has_no_freespace_behind_boxes_as_high_as_the_camera() -> None:
     high = compare_recall(rooms=1, seed=2, lowest_box=1.0)
     assert max(high.points.false_free_beyond.max(), high.segments.false_free_beyond.max()) < 1e-3
 
 
-def test_features_even_over_the_image_are_a_choice() -> None:
+def test_features_can_be_evenly_spread_over_the_image() -> None:
     image = compare_recall(rooms=1, seed=2, spread="image", resolution=0.1524)
     surfaces = compare_recall(rooms=1, seed=2, resolution=0.1524)
     assert at(image.points, 100)[0] < at(surfaces.points, 100)[0]
@@ -79,7 +79,7 @@ def test_more_points_show_more_freespace(curves: Curves) -> None:
         assert (np.diff(curve.free_recall[:up_to_300]) > 0).all()
 
 
-def test_shares_are_shares(curves: Curves) -> None:
+def test_shares_are_between_0_and_1(curves: Curves) -> None:
     for curve in curves:
         for shares in curve[1:]:
             assert shares.shape == curve.counts.shape
@@ -91,7 +91,7 @@ def test_the_same_seed_gives_the_same_curves() -> None:
     np.testing.assert_array_equal(np.hstack(first), np.hstack(second))
 
 
-def test_every_room_is_announced_once() -> None:
+def test_watch_receives_every_room_once() -> None:
     seen: list[int] = []
 
     def watch(rooms: list[int]) -> list[int]:
@@ -118,7 +118,7 @@ def test_no_room_is_refused() -> None:
         compare_recall(rooms=0)
 
 
-def test_another_spread_is_refused() -> None:
+def test_an_unknown_spread_is_refused() -> None:
     with pytest.raises(InputError, match="spread: expected surfaces or image, got 'sky'"):
         compare_recall(spread="sky")  # type: ignore[arg-type]
 
@@ -129,7 +129,7 @@ def test_a_lowest_box_higher_than_the_highest_is_refused(height: float) -> None:
         compare_recall(lowest_box=height)
 
 
-def test_settings_are_checked_before_anything_is_made() -> None:
+def test_settings_are_checked_before_rooms_are_generated() -> None:
     with pytest.raises(SettingsError, match="Did you mean 'link_length'"):
         compare_recall(link_lenght=1.0)
 
@@ -139,7 +139,7 @@ def axes() -> tuple[Axes, Axes]:
     return left, right
 
 
-def test_curves_are_drawn_as_they_are() -> None:
+def test_curves_are_drawn_unchanged() -> None:
     ax = axes()
     rows: dict[str, list[list[float]]] = {
         "fan": [[50, 100, 110], [0.5, 0.6, 0.7], [0.0, 0.1, 0.2]],
@@ -162,7 +162,7 @@ def test_curves_are_drawn_as_they_are() -> None:
         assert [text.get_text() for text in legend.get_texts()] == ["fan", "rays"]
 
 
-def test_curves_that_are_none_are_refused() -> None:
+def test_invalid_curves_are_refused() -> None:
     with pytest.raises(InputError, match="fan"):
         draw_curves({"fan": [[1.0, 2.0]]}, ax=axes())
     with pytest.raises(InputError, match="fan"):

@@ -112,9 +112,7 @@ def test_each_feature_is_held_out_once_and_never_mapped_in_the_same_fold(name: s
             if name == "thin":
                 assert len(mapped) < 300
             pairs += [(number, landmark) for landmark in held]
-    assert sorted(pairs) == [
-        (number, landmark) for number in range(10) for landmark in range(1000)
-    ]
+    assert sorted(pairs) == [(number, landmark) for number in range(10) for landmark in range(1000)]
 
 
 def test_small_cells_around_many_points_do_not_fill_the_memory() -> None:

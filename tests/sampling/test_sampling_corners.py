@@ -28,7 +28,7 @@ from planners import (
 )
 from planners.bench.samplers import Optimum, Race, row
 from planners.bench.trials import Attempt
-from planners.bench.worker_pool import _result, _Worker
+from planners.bench.worker_pool import _receive, _Worker
 from planners.costmap.costmap import Costmap
 from planners.route.solve import solve
 from planners.sampling import threaded_solve
@@ -168,16 +168,16 @@ def halved(number: Any) -> Any:
 
 def test_who_ends_before_it_reads_its_task_loses_that_task() -> None:
     for given_first in (True, False):
-        hand = _Worker(halved)
+        worker = _Worker(halved)
         if given_first:
-            hand.give(3, 60.0)
-        hand.process.kill()
-        hand.process.join()
+            worker.send(3, 60.0)
+        worker.process.kill()
+        worker.process.join()
         if not given_first:
-            hand.give(3, 60.0)
-        result, fit = _result(hand, lambda task, reason: (task, reason), 60.0)
+            worker.send(3, 60.0)
+        result, fit = _receive(worker, lambda task, reason: (task, reason), 60.0)
         assert (result, fit) == ((3, "its process ended with -9"), False)
-        hand.dismiss()
+        worker.kill()
 
 
 def test_a_route_of_no_length_has_no_ratio() -> None:

@@ -25,17 +25,17 @@ def test_regular_expressions_are_found(pattern: str, found: bool) -> None:
     assert is_found(pattern, "an area of 2.5 m²") == found
 
 
-def test_a_search_without_end_is_ended_and_finds_nothing() -> None:
+def test_an_endless_search_is_stopped_and_finds_nothing() -> None:
     assert not is_found("(a+)+$", "a" * 200 + "b")
 
 
 @pytest.mark.parametrize(
     "pattern", ["(", "a{99999999999}", "(" * 400, "x" * 501, "[[" * 10], ids=len
 )
-def test_what_is_no_pattern_is_refused(pattern: str) -> None:
+def test_an_invalid_pattern_is_refused(pattern: str) -> None:
     with pytest.raises(InputError, match=r"^reason: expected (a regular|500 characters)"):
         check_pattern("reason", pattern)
 
 
-def test_a_pattern_that_python_warns_of_brings_no_warning() -> None:
+def test_python_warnings_about_a_pattern_are_suppressed() -> None:
     check_pattern("reason", "[[a]")

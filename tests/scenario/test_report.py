@@ -1,4 +1,4 @@
-"""The report and the table of outcomes, read as a browser and a person would."""
+"""The HTML report, parsed as a browser would."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from matplotlib.image import imread
 from groundmap.draw import figure_png
 from planners.scenario.outcome import Bound, Outcome
 from planners.scenario.report import Section, format_figure, write_report
-from planners.scenario.table import print_table
 
 VOID = {"meta", "img", "br"}
 PICTURE = figure_png(Figure(figsize=(1.0, 0.5)), dpi=20)
@@ -93,7 +92,7 @@ def test_every_tag_is_closed(html: str) -> None:
     assert {tag for tag, _ in Page(html).tags} >= {"html", "head", "body", "table", "section"}
 
 
-def test_every_name_every_reason_and_every_sentence_is_there(html: str) -> None:
+def test_names_purposes_and_remarks_are_on_the_page(html: str) -> None:
     text = "".join(Page(html).text)
     for outcome in OUTCOMES:
         for part in (outcome.name, outcome.why, outcome.skipped, *outcome.missed):
@@ -102,11 +101,11 @@ def test_every_name_every_reason_and_every_sentence_is_there(html: str) -> None:
     assert SECTION.text in text
 
 
-def test_the_headline_counts(html: str) -> None:
+def test_the_headline_has_the_counts(html: str) -> None:
     assert "1 passed, 1 failed, 1 skipped in 3.2 s" in Page(html).text
 
 
-def test_what_scenarios_say_is_text_and_no_markup(html: str) -> None:
+def test_texts_of_scenarios_are_escaped(html: str) -> None:
     assert Page(html).all("script") == []
     assert Page(html).all("b") == []
     assert "&lt;script&gt;" in html
@@ -137,7 +136,7 @@ def test_each_name_links_to_its_case(html: str) -> None:
     assert {link.removeprefix("#") for link in links} <= places
 
 
-def test_the_table_of_cases_says_what_failed_in_words(html: str) -> None:
+def test_the_table_of_cases_has_verdicts_in_words(html: str) -> None:
     rows = Page(html).cells[: len(OUTCOMES) + 1]
     assert rows[0] == ["case", "verdict", "seconds", "missed bounds"]
     assert [row[:3] for row in rows[1:]] == [
@@ -162,20 +161,20 @@ def test_a_section_has_its_table(html: str) -> None:
     assert rows[-2:] == [["features", "recall"], ["50", "0.1235"]]
 
 
-def test_it_reads_on_phones_and_in_the_dark(html: str) -> None:
+def test_the_page_adapts_to_phones_and_dark_mode(html: str) -> None:
     assert "width=device-width" in html
     assert "prefers-color-scheme: dark" in html
     assert "max-width: 100%" in html
 
 
-def test_no_outcomes_make_a_report_too(tmp_path: Path) -> None:
+def test_a_report_without_outcomes_is_written(tmp_path: Path) -> None:
     write_report(tmp_path / "report.html", [], sections=[Section("Alone", "No picture, no table.")])
     page = Page((tmp_path / "report.html").read_text(encoding="utf-8"))
     assert page.all("img") == []
     assert "0 passed, 0 failed, 0 skipped in 0.0 s" in page.text
 
 
-def test_a_folder_that_is_not_there_is_an_error(tmp_path: Path) -> None:
+def test_a_missing_folder_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="No such file or directory"):
         write_report(tmp_path / "nowhere" / "report.html", OUTCOMES)
 
@@ -186,21 +185,3 @@ def test_a_folder_that_is_not_there_is_an_error(tmp_path: Path) -> None:
 )
 def test_numbers_have_four_digits(value: float | str | None, text: str) -> None:
     assert format_figure(value) == text
-
-
-def test_the_table_on_stdout_lines_up(capsys: pytest.CaptureFixture[str]) -> None:
-    print_table(OUTCOMES)
-    assert capsys.readouterr().out.splitlines() == [
-        "room                  passed      1.2 s",
-        "glass & <b>steel</b>  FAILED      2.0 s",
-        "    false_free: 0.25, expected ≤ 0.01",
-        "    clearance was not measured",
-        "drive                 skipped     0.0 s",
-        "    The log is not here.",
-        "1 passed, 1 failed, 1 skipped in 3.2 s",
-    ]
-
-
-def test_no_outcomes_print_their_count(capsys: pytest.CaptureFixture[str]) -> None:
-    print_table([])
-    assert capsys.readouterr().out == "0 passed, 0 failed, 0 skipped in 0.0 s\n"

@@ -1,4 +1,4 @@
-"""A scenario's file: all that it says is taken over, and what is wrong with it is said."""
+"""Scenario files: every setting is read, and errors name the file and the key."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ false_free = { max = 0.1 }
 
 
 def write(folder: Path, text: str) -> Path:
-    """Write a scenario into a folder, which is made if it isn't there."""
+    """Write a scenario into a folder, which is created if necessary."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / FILE
     path.write_text(text, encoding="utf-8")
@@ -106,14 +106,14 @@ def write(folder: Path, text: str) -> Path:
 
 
 def assert_refused(folder: Path, text: str, sentence: str) -> None:
-    """Check that the file and what is wrong with it are named, and nothing else is said."""
+    """Check that the message names the file and the error, and has nothing else."""
     path = write(folder / "case", text)
     with pytest.raises(FileFormatError, match=rf"^{re.escape(str(path))}: {sentence}$") as caught:
         load_scenario(path)
     assert caught.value.path == path
 
 
-def test_all_that_a_file_says_is_taken_over(tmp_path: Path) -> None:
+def test_every_setting_of_a_file_is_read(tmp_path: Path) -> None:
     path = write(tmp_path / "hall", FULL)
     scenario = load_scenario(path)
     assert (scenario.name, scenario.path) == ("hall", path)
@@ -155,7 +155,7 @@ def test_all_that_a_file_says_is_taken_over(tmp_path: Path) -> None:
     }
 
 
-def test_the_world_holds_what_its_kind_makes_and_what_is_named(tmp_path: Path) -> None:
+def test_the_world_has_generated_and_listed_solids(tmp_path: Path) -> None:
     world = build_world(load_scenario(write(tmp_path, FULL)))
     assert [solid.outline.bounds[:2] for solid in world.solids] == [(2.0, 1.0), (4.9, 2.9)]
     assert [hole.depth for hole in world.holes] == [0.4]
@@ -169,7 +169,7 @@ def test_the_world_holds_what_its_kind_makes_and_what_is_named(tmp_path: Path) -
     assert more.solids[-1].outline.bounds == (1.0, 1.0, 2.0, 2.0)
 
 
-def test_the_smallest_file_leaves_all_else_at_its_defaults(tmp_path: Path) -> None:
+def test_a_minimal_file_has_defaults(tmp_path: Path) -> None:
     scenario = load_scenario(write(tmp_path, SMALLEST))
     assert (scenario.seed, scenario.level_ground) == (0, False)
     assert (scenario.scan, scenario.solids, scenario.holes, scenario.queries) == (None, (), (), ())
@@ -178,13 +178,13 @@ def test_the_smallest_file_leaves_all_else_at_its_defaults(tmp_path: Path) -> No
     assert not scenario.bounds
 
 
-def test_a_file_of_another_name_is_called_after_itself(tmp_path: Path) -> None:
+def test_a_file_of_another_name_names_its_scenario(tmp_path: Path) -> None:
     path = write(tmp_path, SMALLEST).rename(tmp_path / "narrow.toml")
     assert load_scenario(path).name == "narrow"
 
 
 @pytest.mark.parametrize("way", ["scenario.toml", "../hall/scenario.toml"])
-def test_a_scenario_is_called_after_its_folder_from_wherever_one_looks(
+def test_a_scenario_is_named_after_its_folder_from_every_working_directory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, way: str
 ) -> None:
     write(tmp_path / "hall", SMALLEST)
@@ -192,7 +192,7 @@ def test_a_scenario_is_called_after_its_folder_from_wherever_one_looks(
     assert load_scenario(Path(way)).name == "hall"
 
 
-def test_a_log_is_looked_for_from_the_scenarios_file_on(tmp_path: Path) -> None:
+def test_the_path_of_a_log_is_relative_to_the_file(tmp_path: Path) -> None:
     path = write(tmp_path / "a" / "b", WHY + '[log]\npath = "../logs/drive"\n')
     log = load_scenario(path).log
     assert log is not None
@@ -201,7 +201,7 @@ def test_a_log_is_looked_for_from_the_scenarios_file_on(tmp_path: Path) -> None:
     assert load_scenario(path).log == tmp_path / "drive"
 
 
-def test_a_map_is_looked_for_from_the_scenarios_file_on(tmp_path: Path) -> None:
+def test_the_path_of_a_map_is_relative_to_the_file(tmp_path: Path) -> None:
     (tmp_path / "hook.map").write_text("type octile\nheight 2\nwidth 3\nmap\n@@.\n@..\n")
     world = '[world]\nkind = "image"\npath = "../hook.map"\nresolution = 0.5\n'
     scenario = load_scenario(write(tmp_path / "hook", WHY + world + DRIVE))
@@ -211,11 +211,11 @@ def test_a_map_is_looked_for_from_the_scenarios_file_on(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["why = [", "why", "[world\n"])
-def test_what_is_not_toml_is_refused(tmp_path: Path, text: str) -> None:
+def test_a_file_that_is_not_toml_is_refused(tmp_path: Path, text: str) -> None:
     assert_refused(tmp_path, text, r"expected a TOML file, got .*(line|end of document).*")
 
 
-def test_what_is_not_text_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_is_not_text_is_refused(tmp_path: Path) -> None:
     path = tmp_path / FILE
     path.write_bytes(b"why = '\xff\xfe'")
     with pytest.raises(
@@ -225,7 +225,7 @@ def test_what_is_not_text_is_refused(tmp_path: Path) -> None:
         load_scenario(path)
 
 
-def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FileFormatError, match=r"none\.toml: expected a scenario file, got no file"):
         load_scenario(tmp_path / "none.toml")
 
@@ -245,7 +245,7 @@ def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
         (SMALLEST + "[[queries]]\nname = 'a'", r"expected start to be a value, got none\."),
     ],
 )
-def test_what_is_missing_is_named(tmp_path: Path, text: str, sentence: str) -> None:
+def test_a_missing_table_or_key_is_named(tmp_path: Path, text: str, sentence: str) -> None:
     assert_refused(tmp_path, text, sentence)
 
 
@@ -280,7 +280,7 @@ def test_an_unknown_key_names_the_nearest_in_every_table(
 
 
 @pytest.mark.parametrize("kind", ['"room"', "3", '["rooms"]', '""'])
-def test_a_world_of_no_known_kind_names_those_that_are(tmp_path: Path, kind: str) -> None:
+def test_an_unknown_kind_of_world_lists_the_known_ones(tmp_path: Path, kind: str) -> None:
     kinds = "corridor, empty, forest, image, parking, rooms, spiral, warehouse"
     got = re.escape(kind.replace('"', "'"))
     assert_refused(
@@ -305,7 +305,7 @@ def test_a_world_of_no_known_kind_names_those_that_are(tmp_path: Path, kind: str
         ("[[world.solids]]\nbox = [1, 1, 2]", r"box\.3 to be a value, got none"),
     ],
 )
-def test_a_solid_or_a_hole_that_is_none_is_refused_before_anything_runs(
+def test_an_invalid_solid_or_hole_is_refused_before_anything_runs(
     tmp_path: Path, table: str, sentence: str
 ) -> None:
     assert_refused(tmp_path, WHY + WORLD + table + "\n" + DRIVE, rf"expected {sentence}.*\.")
@@ -323,19 +323,19 @@ def test_a_solid_or_a_hole_that_is_none_is_refused_before_anything_runs(
         ("[bounds]\n'a.b' = {}", r"bounds\.a\.b to be min, max, or both, got neither"),
         (
             "[bounds]\nunknown = { min = 2, max = 1 }",
-            r"bounds\.unknown to be min of at most max, got 2 and 1",
+            r"bounds\.unknown to be min not above max, got 2 and 1",
         ),
         (
             f"{ASKED}max_ratio = 1.1\n[bounds]\n'a.ratio' = {{ max = 1.5 }}",
-            r"bounds\.a\.ratio to be no bound, .* ≤ 1\.1 itself, got ≤ 1\.5\. .*max_ratio.*",
+            r"bounds\.a\.ratio to be no bound, .* ≤ 1\.1, got ≤ 1\.5\. .*max_ratio.*",
         ),
         (
             f"{ASKED}[bounds]\n'a.collisions' = {{ max = 2 }}",
-            r"bounds\.a\.collisions to be no bound, .* ≤ 0 itself, got ≤ 2\. .*robot_radius.*",
+            r"bounds\.a\.collisions to be no bound, .* ≤ 0, got ≤ 2\. .*robot_radius.*",
         ),
         (
             f"{ASKED}expect = 'EnclosedError'\n[bounds]\n'a.outcome' = {{ max = 0 }}",
-            r"bounds\.a\.outcome to be no bound, .* = EnclosedError itself.*'expect' of the query",
+            r"bounds\.a\.outcome to be no bound, .* = EnclosedError.*'expect' of the query",
         ),
     ],
 )
@@ -344,7 +344,9 @@ def test_a_value_out_of_its_range_is_refused(tmp_path: Path, table: str, sentenc
 
 
 @pytest.mark.parametrize("name", ["a.ratio", "a.length", "b.collisions"])
-def test_a_figure_that_no_query_holds_may_be_bounded(tmp_path: Path, name: str) -> None:
+def test_a_figure_without_a_bound_of_a_query_can_have_one_in_bounds(
+    tmp_path: Path, name: str
+) -> None:
     path = tmp_path / FILE
     path.write_text(SMALLEST + ASKED + f"[bounds]\n'{name}' = {{ max = 1.5 }}\n")
     assert load_scenario(path).bounds == {name: Bound(max=1.5)}
@@ -355,13 +357,13 @@ def test_the_path_of_a_map_is_text(tmp_path: Path) -> None:
     assert_refused(tmp_path, text, r"expected path to be .*path.*, got 3\.")
 
 
-def test_queries_of_one_name_are_refused_since_their_figures_would_be(tmp_path: Path) -> None:
+def test_queries_of_the_same_name_are_refused(tmp_path: Path) -> None:
     text = FULL.replace('"back"', '"there"')
-    sentence = r"expected queries to be a name of its own for each, got there, there\."
+    sentence = r"expected queries to be of different names, got there, there\."
     assert_refused(tmp_path, text, sentence)
 
 
-def test_scenarios_are_found_at_any_depth_by_name(tmp_path: Path) -> None:
+def test_scenarios_are_found_at_any_depth_and_sorted(tmp_path: Path) -> None:
     paths = [write(tmp_path / part, SMALLEST) for part in ("a", "b/c/d", "b/c", "e")]
     assert find_scenarios([tmp_path]) == sorted(paths)
     assert find_scenarios([tmp_path / "b", tmp_path / "a"]) == [*sorted(paths[1:3]), paths[0]]
@@ -372,7 +374,7 @@ def test_a_single_file_is_found_whatever_its_name(tmp_path: Path) -> None:
     assert find_scenarios([path]) == [path]
 
 
-def test_what_is_found_twice_is_given_once(tmp_path: Path) -> None:
+def test_duplicate_paths_are_removed(tmp_path: Path) -> None:
     path = write(tmp_path / "a", SMALLEST)
     assert find_scenarios([tmp_path, path, tmp_path / "a"]) == [path]
 
@@ -389,7 +391,7 @@ def test_a_place_without_scenarios_is_refused(tmp_path: Path, name: str) -> None
 
 @pytest.mark.skipif(not FILES, reason="the scenarios are with the sources")
 @pytest.mark.parametrize("path", FILES, ids=[path.parent.name for path in FILES])
-def test_every_scenario_of_the_project_says_why_and_is_held_to_something(path: Path) -> None:
+def test_every_scenario_of_the_project_has_a_purpose_and_bounds(path: Path) -> None:
     scenario = load_scenario(path)
     assert scenario.name == path.parent.name
     assert len(scenario.why.split()) >= 6

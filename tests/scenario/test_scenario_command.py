@@ -75,7 +75,7 @@ def test_run_exits_0_if_all_pass_or_are_skipped(folder: Path) -> None:
     assert [ran.json[key] for key in ("passed", "failed", "skipped")] == [1, 0, 1]
 
 
-def test_two_at_once_find_what_one_after_the_other_do(folder: Path) -> None:
+def test_parallel_and_serial_runs_have_equal_results(folder: Path) -> None:
     one = run("scenario", "run", folder, "--json", "--jobs", "1")
     two = run_process("scenario", "run", folder, "--json", "--jobs", "2")
     assert one.code == two.code == 1
@@ -83,7 +83,7 @@ def test_two_at_once_find_what_one_after_the_other_do(folder: Path) -> None:
     assert cases(two) == cases(one)
 
 
-def test_people_read_a_line_for_each_case_and_what_it_missed(folder: Path) -> None:
+def test_the_table_has_a_line_per_case_and_its_missed_bounds(folder: Path) -> None:
     ran = run("scenario", "run", folder, "--jobs", "1")
     assert ran.code == 1
     lines = ran.out.splitlines()
@@ -93,16 +93,14 @@ def test_people_read_a_line_for_each_case_and_what_it_missed(folder: Path) -> No
     assert lines[-1].startswith("1 passed, 1 failed, 1 skipped in ")
 
 
-def test_a_world_that_cannot_be_mapped_does_not_keep_the_others_from_running(folder: Path) -> None:
+def test_a_world_that_cannot_be_mapped_does_not_stop_the_others(folder: Path) -> None:
     write(folder / "blind", SKIPPED.replace("no-log", "."))
     ran = run("scenario", "run", folder / "blind", folder / "clear", "--json", "--jobs", "1")
     assert (ran.code, ran.json["passed"], ran.json["failed"]) == (1, 1, 1)
     assert cases(ran)["blind"]["missed"][0].startswith("FileFormatError: ")
 
 
-def test_the_folder_is_scenarios_unless_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_default_folder_is_scenarios(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write(tmp_path / "scenarios" / "gone", SKIPPED)
     monkeypatch.chdir(tmp_path)
     assert list(cases(run("scenario", "run", "--json"))) == ["gone"]
@@ -166,7 +164,7 @@ def test_a_new_scenario_names_every_kind_of_world(tmp_path: Path) -> None:
     assert "corridor, empty, forest, image, parking, rooms, spiral, warehouse" in text
 
 
-def test_a_new_scenario_takes_nobodys_place(tmp_path: Path) -> None:
+def test_a_new_scenario_does_not_replace_another(tmp_path: Path) -> None:
     path = write(tmp_path / "mine", SKIPPED)
     ran = run("scenario", "new", "mine", "--folder", tmp_path, "--json")
     assert_refused(ran, f"{path}: expected no scenario there yet, got one. Give another name.")

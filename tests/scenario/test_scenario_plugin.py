@@ -1,4 +1,4 @@
-"""Scenarios under pytest, in a process of its own: a test for each, and no traceback."""
+"""Scenarios under pytest in a separate process: one test per scenario, and no traceback."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from test_scenario_run import write
 
 
 class Report(NamedTuple):
-    """How pytest ended: its failures, told one by one, and all else that it says."""
+    """Result of pytest: exit code, the text of all failures, and the rest of its output."""
 
     code: int
     folder: Path
@@ -24,7 +24,7 @@ class Report(NamedTuple):
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Report:
-    """Two scenarios that fail, one that passes, one that is skipped, and a file that is none."""
+    """A scenario that passes, one that fails, one that is skipped, and an invalid file."""
     folder = tmp_path_factory.mktemp("cases")
     (folder / "pytest.ini").write_text("[pytest]\n")
     write(folder / "bad", SKIPPED + "[maper]\n")
@@ -48,7 +48,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Report:
     return Report(done.returncode, folder, failures, head + tail)
 
 
-def test_there_is_one_test_for_each_scenario_called_by_its_name(report: Report) -> None:
+def test_there_is_one_test_per_scenario_with_its_name(report: Report) -> None:
     lines = [line.split()[:2] for line in report.rest.splitlines() if "::" in line]
     assert lines == [
         ["bad/scenario.toml::bad", "FAILED"],
@@ -60,13 +60,13 @@ def test_there_is_one_test_for_each_scenario_called_by_its_name(report: Report) 
     assert "2 failed, 1 passed, 1 skipped" in report.rest
 
 
-def test_what_failed_says_why_it_exists_and_which_bounds_it_missed(report: Report) -> None:
-    told = r"\nstrict: A tiny hall with a box\.\nfree_recall is 0\.\d+, not ≥ 2\n"
-    assert re.search(told, report.failures)
+def test_a_failure_shows_the_purpose_and_the_missed_bounds(report: Report) -> None:
+    text = r"\nstrict: A tiny hall with a box\.\nfree_recall is 0\.\d+, not ≥ 2\n"
+    assert re.search(text, report.failures)
     assert "unknown is" not in report.failures  # a bound that holds
 
 
-def test_a_file_that_is_no_scenario_fails_with_a_sentence(report: Report) -> None:
+def test_an_invalid_file_fails_with_one_sentence(report: Report) -> None:
     path = report.folder / "bad" / "scenario.toml"
     assert f"\n{path}: expected maper to be a setting" in report.failures
     assert "Did you mean 'mapper'?" in report.failures

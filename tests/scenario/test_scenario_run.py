@@ -1,4 +1,4 @@
-"""Scenarios, run: what holds passes, what does not says so, and what can't be is no traceback."""
+"""Running scenarios: bounds that hold pass, missed bounds and errors are sentences."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ MATCHED = "[sensor]\nmissing = 0.2\nfalse_matches = 0.05\n"
 
 
 def write(folder: Path, text: str) -> Path:
-    """Write a scenario into a folder, which is made if it isn't there."""
+    """Write a scenario into a folder, which is created if necessary."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "scenario.toml"
     path.write_text(text, encoding="utf-8")
@@ -83,7 +83,7 @@ def number(outcome: Outcome, name: str) -> float:
     return value
 
 
-def test_a_tiny_world_keeps_its_bounds(tmp_path: Path) -> None:
+def test_a_tiny_world_satisfies_its_bounds(tmp_path: Path) -> None:
     bounds = (
         "[bounds]\nfree_recall = { min = 0.95 }\nfalse_free_beyond = { max = 0 }\n"
         '"along.length" = { min = 2.4, max = 2.6 }\n'
@@ -102,7 +102,7 @@ def test_a_tiny_world_keeps_its_bounds(tmp_path: Path) -> None:
     assert outcome.seconds > 0
 
 
-def test_a_bound_that_does_not_hold_is_said_with_figure_and_bound(tmp_path: Path) -> None:
+def test_a_missed_bound_is_reported_with_figure_and_bound(tmp_path: Path) -> None:
     bounds = (
         "[bounds]\nfree_recall = { min = 2 }\nvisible_m2 = { max = 1 }\n"
         "false_free_beyond = { min = 0.3, max = 0.4 }\nfree_precision = { min = 0.9 }\n"
@@ -117,7 +117,7 @@ def test_a_bound_that_does_not_hold_is_said_with_figure_and_bound(tmp_path: Path
     )
 
 
-def test_a_bound_on_what_is_no_figure_names_those_that_are(tmp_path: Path) -> None:
+def test_a_bound_on_an_unknown_figure_lists_the_known_ones(tmp_path: Path) -> None:
     bounds = '[bounds]\nfree_recal = { min = 0 }\n"along.lenght" = { max = 9 }\n'
     outcome = run_scenario(write(tmp_path, HALL + query() + bounds))
     there = ", ".join(outcome.figures)
@@ -129,7 +129,7 @@ def test_a_bound_on_what_is_no_figure_names_those_that_are(tmp_path: Path) -> No
     assert "along.length" in there
 
 
-def test_errors_that_are_expected_pass_when_they_happen(tmp_path: Path) -> None:
+def test_expected_errors_pass(tmp_path: Path) -> None:
     queries = (
         query("closed", start=(1.5, 2), goal=(5, 2), more='expect = "EnclosedError"'),
         query("wall", start=(1.5, 2), goal=(2.8, 2), more='expect = "NonFreeError"'),
@@ -149,7 +149,7 @@ def test_errors_that_are_expected_pass_when_they_happen(tmp_path: Path) -> None:
     assert "closed.length" not in outcome.figures
 
 
-def test_an_error_that_is_not_expected_fails_with_its_reason(tmp_path: Path) -> None:
+def test_an_unexpected_error_fails_with_its_reason(tmp_path: Path) -> None:
     text = ROOMS + query("closed", start=(1.5, 2), goal=(5, 2))
     outcome = run_scenario(write(tmp_path, text))
     assert outcome.passed is False
@@ -158,7 +158,7 @@ def test_an_error_that_is_not_expected_fails_with_its_reason(tmp_path: Path) -> 
     assert "enclosed" in missed
 
 
-def test_the_sentence_of_an_error_holds_the_reason_that_is_expected(tmp_path: Path) -> None:
+def test_the_message_of_an_error_matches_the_expected_reason(tmp_path: Path) -> None:
     expected = 'expect = "EnclosedError"\nreason = '
     into: dict[str, Any] = {"start": (1.5, 2), "goal": (5, 2)}
     right = query("right", **into, more=expected + r"'enclosed in .* \d+\.\d m²'")
@@ -166,10 +166,10 @@ def test_the_sentence_of_an_error_holds_the_reason_that_is_expected(tmp_path: Pa
     outcome = run_scenario(write(tmp_path, ROOMS + right + wrong))
     assert str(outcome.figures["right.reason"]).startswith("no route: the goal is enclosed in ")
     (missed,) = outcome.missed
-    assert re.fullmatch(r"wrong\.reason is no route: .*, not with 'too narrow' in it", missed)
+    assert re.fullmatch(r"wrong\.reason is no route: .*, not a match of 'too narrow'", missed)
 
 
-def test_time_and_unknown_space_are_the_querys_to_tell(tmp_path: Path) -> None:
+def test_time_limit_and_unknown_space_are_settings_of_a_query(tmp_path: Path) -> None:
     unseen: dict[str, Any] = {"start": (1.5, 2), "goal": (0.5, 0.5)}
     queries = (
         query("hurried", more='expect = "TimeLimitError"\ntime_limit = 0.0'),
@@ -179,7 +179,7 @@ def test_time_and_unknown_space_are_the_querys_to_tell(tmp_path: Path) -> None:
     assert run_scenario(write(tmp_path, HALL + "".join(queries))).missed == ()
 
 
-def test_an_outline_is_planned_with_as_a_footprint(tmp_path: Path) -> None:
+def test_an_outline_can_be_the_footprint(tmp_path: Path) -> None:
     outline = [[-0.1, -0.1], [0.5, -0.1], [0.5, 0.1], [-0.1, 0.1]]
     text = HALL + query().replace("footprint = 0.3", f"footprint = {outline}")
     outcome = run_scenario(write(tmp_path, text))
@@ -207,7 +207,7 @@ def test_a_route_where_an_error_is_expected_fails(tmp_path: Path) -> None:
         ("time_limit = -1", "expected time_limit to be greater than or equal to 0"),
     ],
 )
-def test_a_query_for_what_does_not_exist_is_refused(
+def test_a_query_with_an_unknown_planner_or_setting_is_refused(
     tmp_path: Path, line: str, message: str
 ) -> None:
     with pytest.raises(FileFormatError, match=message):
@@ -218,7 +218,7 @@ def test_a_query_for_what_does_not_exist_is_refused(
     ("footprint", "got"),
     [("-0.1", "-0.1"), ("[[0, 0], [1, 1], [1, 0], [0, 1]]", "a self-intersection at .*")],
 )
-def test_a_query_with_what_is_no_footprint_is_refused(
+def test_a_query_with_an_invalid_footprint_is_refused(
     tmp_path: Path, footprint: str, got: str
 ) -> None:
     text = HALL + query().replace("footprint = 0.3", f"footprint = {footprint}")
@@ -255,7 +255,7 @@ def test_no_route_is_much_shorter_than_the_best_in_the_true_world(
     assert 0.95 <= length / optimum <= 1.2
 
 
-def test_a_world_without_solids_has_nothing_to_come_near_to(tmp_path: Path) -> None:
+def test_a_world_without_solids_has_no_true_clearance(tmp_path: Path) -> None:
     wall = "[[world.solids]]\nwall = [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]\n"
     box = "[[world.solids]]\nbox = [2.5, 1.5, 3.5, 2.2]\n"
     outcome = run_scenario(write(tmp_path, HALL.replace(wall, "").replace(box, "") + query()))
@@ -265,7 +265,7 @@ def test_a_world_without_solids_has_nothing_to_come_near_to(tmp_path: Path) -> N
     assert outcome.figures["nonfree_recall"] is None
 
 
-def test_a_figure_of_nothing_keeps_to_no_bound(tmp_path: Path) -> None:
+def test_a_missing_figure_misses_every_bound(tmp_path: Path) -> None:
     text = (
         'why = "Nothing stands there."\nlevel_ground = true\n[world]\nbounds = [0, 0, 6, 4]\n'
         "[scan]\nground = 0.2\n[drive]\nstops = [[1, 2, 0]]\n[bounds]\nnonfree_recall = { min = 0 }"
@@ -275,7 +275,7 @@ def test_a_figure_of_nothing_keeps_to_no_bound(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("level", ["true", "false"])
-def test_a_world_without_features_fails_with_a_sentence(tmp_path: Path, level: str) -> None:
+def test_a_world_without_features_fails_with_the_error(tmp_path: Path, level: str) -> None:
     scan = "[scan]\nbearing = 0.5\nground = 0.15\n"
     blind = HALL.replace(scan, "[sensor]\nmax_points = 0\nmax_segments = 0\n")
     text = blind.replace("level_ground = true", f"level_ground = {level}")
@@ -287,7 +287,7 @@ def test_a_world_without_features_fails_with_a_sentence(tmp_path: Path, level: s
     assert (outcome.figures, outcome.picture) == ({}, b"")
 
 
-def test_a_map_that_is_not_there_fails_with_a_sentence(tmp_path: Path) -> None:
+def test_a_missing_map_fails_with_the_error(tmp_path: Path) -> None:
     text = 'why = "No map."\n[world]\nkind = "image"\npath = "no.map"\n[drive]\nstops = [[0, 0, 0]]'
     outcome = run_scenario(write(tmp_path, text))
     assert outcome.passed is False
@@ -295,7 +295,7 @@ def test_a_map_that_is_not_there_fails_with_a_sentence(tmp_path: Path) -> None:
     assert sentence.startswith(f"FileFormatError: {tmp_path / 'no.map'}: expected a readable file")
 
 
-def test_a_missing_log_is_skipped_with_its_place(tmp_path: Path) -> None:
+def test_a_missing_log_is_skipped_with_its_path(tmp_path: Path) -> None:
     text = 'why = "A drive."\n[log]\npath = "no-log"\n[bounds]\n"views.ground_free" = { min = 2 }'
     outcome = run_scenario(write(tmp_path / "drive", text))
     assert (outcome.name, outcome.passed, outcome.missed) == ("drive", None, ())
@@ -303,7 +303,7 @@ def test_a_missing_log_is_skipped_with_its_place(tmp_path: Path) -> None:
     assert outcome.figures == {}
 
 
-def test_a_log_is_judged_by_what_was_held_out_of_it(tmp_path: Path) -> None:
+def test_a_log_is_judged_by_held_out_features(tmp_path: Path) -> None:
     demo = read_views(str(files("planners") / "demo_data"))
     write_views(itertools.islice(demo, 8), tmp_path / "views")
     text = (
@@ -315,13 +315,13 @@ def test_a_log_is_judged_by_what_was_held_out_of_it(tmp_path: Path) -> None:
     assert about == {"views", "ids", "thin", "stamping", "along"}
     assert 0.5 < number(outcome, "views.ground_free") <= 1.0
     assert outcome.picture.startswith(b"\x89PNG")
-    assert "along.collisions" not in outcome.bounds  # nobody knows what the route would touch
+    assert "along.collisions" not in outcome.bounds  # the true world is unknown
     missing, *others = outcome.missed
     assert missing.startswith("there is no figure views.ground_fre; there are views.")
     assert all(sentence.startswith("along.outcome is ") for sentence in others)
 
 
-def test_a_log_that_is_none_fails_with_a_sentence(tmp_path: Path) -> None:
+def test_an_invalid_log_fails_with_the_error(tmp_path: Path) -> None:
     (tmp_path / "views").mkdir()
     outcome = run_scenario(write(tmp_path, 'why = "A drive."\n[log]\npath = "views"\n'))
     assert outcome.passed is False
@@ -337,7 +337,7 @@ def test_the_same_seed_gives_the_same_figures_and_another_gives_others(tmp_path:
     assert other.figures["free_recall"] != first.figures["free_recall"]
 
 
-def test_what_is_no_scenario_is_refused(tmp_path: Path) -> None:
+def test_an_invalid_scenario_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FileFormatError, match=r"scenario\.toml: expected a \[world\] or a \[log\]"):
         run_scenario(write(tmp_path, 'why = "Nothing."'))
 
@@ -371,19 +371,19 @@ def test_what_is_no_scenario_is_refused(tmp_path: Path) -> None:
         (Bound(min=0.0), "route", False),
     ],
 )
-def test_a_bound_holds_what_keeps_to_it_and_nothing_that_is_missing(
+def test_a_bound_holds_for_values_in_it_and_not_for_missing_ones(
     bound: Bound, value: Figure, holds: bool
 ) -> None:
     assert bound.holds(value) is holds
 
 
-def test_a_bound_reads_as_people_write_it() -> None:
+def test_a_bound_as_text() -> None:
     bounds = Bound(min=0.97), Bound(max=0), Bound(min=1, max=2.5), Bound(equals="route")
     assert [str(bound) for bound in bounds] == ["≥ 0.97", "≤ 0", "≥ 1 and ≤ 2.5", "= route"]
-    assert str(Bound(matches="enclosed")) == "with 'enclosed' in it"
+    assert str(Bound(matches="enclosed")) == "a match of 'enclosed'"
 
 
-def test_a_world_of_too_many_cells_fails_with_what_to_do(
+def test_a_world_of_too_many_cells_fails_with_a_hint(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("planners.scenario.simulated.MOST_CELLS", 100.0)

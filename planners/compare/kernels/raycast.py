@@ -1,4 +1,4 @@
-"""Casting rays over a dense block of cells; coordinates are in cells, x along columns."""
+"""Kernels that cast rays on a dense block of cells; coordinates are in cells, x along columns."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from groundmap.arrays import Floats, Floats32
 
 @njit(cache=True, nogil=True)
 def cast_rays(z: Floats32, origin: Floats, ends: Floats, value: np.float32) -> None:
-    """Set to `value` all cells that rays pass through (Amanatides and Woo 1987).
+    """Set all cells that rays pass through to `value` (Amanatides and Woo 1987).
 
     Parameters
     ----------
     z : ndarray, shape (rows, cols)
-        Must hold `origin` and all `ends`.
+        Contains `origin` and all `ends`; changed in place.
     origin : ndarray, shape (2,) [cells]
     ends : ndarray, shape (n, 2) [cells]
     value : float32
@@ -32,13 +32,13 @@ def _cast_ray(
     last_col, last_row = int(np.floor(end_x)), int(np.floor(end_y))
     dx, dy = end_x - x, end_y - y
     step_x, step_y = (1 if dx > 0 else -1), (1 if dy > 0 else -1)
-    # Share of the ray at the next border in x and y, and from one border to the next.
+    # Fraction of the ray at the next border in x and y, and between two borders.
     next_x = ((col + (dx > 0)) - x) / dx if dx != 0.0 else np.inf
     next_y = ((row + (dy > 0)) - y) / dy if dy != 0.0 else np.inf
     each_x = abs(1.0 / dx) if dx != 0.0 else np.inf
     each_y = abs(1.0 / dy) if dy != 0.0 else np.inf
     z[row, col] = value
-    # The number of borders is known beforehand, so rounding can't make the walk miss its end.
+    # The number of borders is known in advance, so the loop ends in spite of rounding.
     for _ in range(abs(last_col - col) + abs(last_row - row)):
         if col != last_col and (next_x < next_y or row == last_row):
             col += step_x
