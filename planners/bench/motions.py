@@ -20,7 +20,8 @@ from groundmap.arrays import Bools, Floats
 from planners.costmap.costmap import Costmap
 from planners.errors import ProblemError
 from planners.problem.problem import PlanningProblem, Pose
-from planners.sampling.motion_validator import Bounds, MotionValidator
+from planners.sampling.motion_validator import Bounds
+from planners.sampling.motion_validator2d import MotionValidator2D
 from planners.sampling.ompl_module import ompl, redirect_log
 from planners.sampling.ompl_states import edge_check, information_of, reader, space_of, state_of
 from planners.sampling.settings import SamplingSettings, StateSpace
@@ -36,7 +37,7 @@ COMPILED, LAMBDA, REACH = "compiled", "lambda", "compiled, own range"
 class MotionQuery(NamedTuple):
     """Where from, where to, and what OMPL samples."""
 
-    validator: MotionValidator
+    validator: MotionValidator2D
     start: Pose  #: as a state
     goal: Pose
     room: Bounds
@@ -61,7 +62,8 @@ def compare_motions(
 
     The space is "r2" for a radius and "se2" for an outline. Rows of the workload "motions" are
     about edges that RRT-Connect asked for, all asked again; those of "first route" about the whole
-    of RRT-Connect, with OMPL's range for edges and, at last, with that of `MotionValidator.reach`.
+    of RRT-Connect, with OMPL's range for edges and, at last, with that of
+    `MotionValidator.max_edge_length`.
 
     Parameters
     ----------
@@ -150,12 +152,12 @@ def _possible(grid: ConfidenceGrid, footprint: Any, queries: Sequence[Any]) -> l
             problem = PlanningProblem(
                 grid, start=start, goal=goal, footprint=footprint, clear_start=False
             )
-            validator = MotionValidator(
+            validator = MotionValidator2D(
                 Costmap.of(problem), "r2" if problem.shape.is_disc else "se2", 1.0
             )
         ends = validator.state_of(start), validator.state_of(goal)
         if all(validator.is_clear(*end, *end) for end in ends):
-            room = validator.room(*ends)
+            room = validator.bounds(*ends)
             if room is not None:
                 found.append(MotionQuery(validator, *ends, room))
     if not found:
@@ -190,7 +192,7 @@ def _recording(check: Callable[..., bool], read: Any, edges: list[Any]) -> Calla
     return recording
 
 
-def _set_steps(space: Any, validator: MotionValidator) -> None:
+def _set_steps(space: Any, validator: MotionValidator2D) -> None:
     """Have OMPL look at states that are a cell apart, or at which the outline has turned by one."""
     size = validator.costmap.window.resolution
     plane = space if validator.space == "r2" else space.getSubspace(0)
@@ -201,7 +203,7 @@ def _set_steps(space: Any, validator: MotionValidator) -> None:
         yaw.setLongestValidSegmentFraction(min(turn / yaw.getMaximumExtent(), 1.0))
 
 
-def lambda_of(validator: MotionValidator) -> Callable[[Any], bool]:
+def lambda_of(validator: MotionValidator2D) -> Callable[[Any], bool]:
     """Return what tells in Python whether a state of OMPL's is clear.
 
     In "r2" it looks up the state's cell: whether the footprint's centre may be on the cell's. In
@@ -225,7 +227,7 @@ def lambda_of(validator: MotionValidator) -> Callable[[Any], bool]:
     return is_valid
 
 
-def _outline(validator: MotionValidator) -> Floats:
+def _outline(validator: MotionValidator2D) -> Floats:
     """Return about 40 points on the outline, evenly spread along its sides [m, base_link]."""
     corners = np.asarray(validator.costmap.problem.shape.polygon)
     closed = np.concatenate([corners, corners[:1]])
@@ -271,7 +273,8 @@ def _edges_of(query: MotionQuery, seed: int, limit: float) -> list[tuple[Pose, P
 def _first(query: MotionQuery, system: str, seed: int, limit: float) -> Search:
     """Search with one of the checks."""
     validator = query.validator
-    longest = validator.reach(validator.region(query.start), query.room) if system == REACH else 0.0
+    region = validator.region(query.start)
+    longest = validator.max_edge_length(region, query.room) if system == REACH else 0.0
     return _search(query, _information(query, system), seed=seed, longest=longest, limit=limit)
 
 
