@@ -15,104 +15,63 @@ class OmplParameters(Settings):
     """
 
     range: float | None = Field(None, gt=0, le=1e6, description="longest edge of a tree [m]")
-    goal_bias: float | None = Field(
-        None, ge=0, le=1, description="share of samples taken at the goal"
-    )
+    goal_bias: float | None = Field(None, ge=0, le=1, description="share of samples at the goal")
     intermediate_states: bool | None = Field(None, description="also add the states along edges")
     max_nearest_neighbors: int | None = Field(
-        None, ge=1, le=10**6, description="neighbours that a new state is joined to [states]"
+        None, ge=1, le=10**6, description="neighbours tried for a new state [states]"
     )
     rewire_factor: float | None = Field(
-        None,
-        ge=1,
-        le=100,
-        description="size of neighbourhoods over the least that optimality requires",
+        None, ge=1, le=100, description="factor on the least radius for optimality"
     )
-    batch_size: int | None = Field(
-        None, ge=1, le=10**4, description="batch of ordered sampling [states]"
-    )
+    batch_size: int | None = Field(None, ge=1, le=10**4, description="size of a sorted batch")
     samples_per_batch: int | None = Field(
-        None, ge=1, le=10**5, description="number of samples per batch [states]"
+        None, ge=1, le=10**5, description="size of a batch [states]"
     )
     num_samples: int | None = Field(
-        None,
-        ge=1,
-        le=10**6,
-        description="number of samples [states]; default: 1000, doubled until a route is found",
+        None, ge=1, le=10**6, description="number of samples; default: 1000, then doubled"
     )
-    num_sampling_attempts: int | None = Field(
-        None, ge=1, le=10**4, description="attempts to find one sample"
-    )
+    num_sampling_attempts: int | None = Field(None, ge=1, le=10**4, description="tries per sample")
     radius_multiplier: float | None = Field(
-        None,
-        ge=1,
-        le=5,
-        description="size of neighbourhoods over the least that optimality requires",
+        None, ge=1, le=5, description="factor on the least radius for optimality"
     )
     free_space_volume: float | None = Field(
-        None, gt=0, description="upper bound of the free space's volume [m²; in se2 m² rad]"
+        None, gt=0, description="upper bound of the free volume [m²; in se2 m² rad]"
     )
     border_fraction: float | None = Field(
-        None, gt=0, le=1, description="share of expansions that start in the outer cells"
+        None, gt=0, le=1, description="share of expansions from the outer cells"
     )
     min_valid_path_fraction: float | None = Field(
         None, gt=0, le=1, description="least valid share of a motion that is kept"
     )
     failed_expansion_cell_score_factor: float | None = Field(
-        None, gt=0, le=1, description="factor on a cell's score after a failed expansion"
+        None, gt=0, le=1, description="factor on a cell's score after a failure"
     )
     prune_threshold: float | None = Field(
-        None, ge=0, le=1, description="least relative improvement that triggers pruning"
+        None, ge=0, le=1, description="relative improvement that triggers pruning"
     )
     prune_threshold_fraction: float | None = Field(
-        None, ge=0, le=1, description="least relative improvement that triggers pruning"
+        None, ge=0, le=1, description="relative improvement that triggers pruning"
     )
-    delay_cc: bool | None = Field(
-        None, description="check edges in order of cost until one is clear"
-    )
-    tree_pruning: bool | None = Field(None, description="drop states that can't improve the route")
-    pruning: bool | None = Field(None, description="drop states that can't improve the route")
-    pruned_measure: bool | None = Field(
-        None, description="compute neighbourhoods from the volume left after pruning"
-    )
-    informed_sampling: bool | None = Field(
-        None, description="sample only states that may improve the route"
-    )
-    sample_rejection: bool | None = Field(
-        None, description="informed sampling by rejection of uniform samples"
-    )
-    new_state_rejection: bool | None = Field(
-        None, description="reject new states that can't improve the route"
-    )
-    admissible_cost_to_come: bool | None = Field(
-        None, description="bound the cost to come by straight lines"
-    )
-    focus_search: bool | None = Field(
-        None, description="pruning, informed sampling and rejection together"
-    )
-    k_nearest: bool | None = Field(None, description="choose neighbours by number, not distance")
-    use_k_nearest: bool | None = Field(
-        None, description="choose neighbours by number, not distance"
-    )
-    nearest_k: bool | None = Field(None, description="choose neighbours by number, not distance")
+    delay_cc: bool | None = Field(None, description="check edges in the order of their costs")
+    tree_pruning: bool | None = Field(None, description="drop states that can't improve a route")
+    pruning: bool | None = Field(None, description="drop states that can't improve a route")
+    pruned_measure: bool | None = Field(None, description="neighbourhoods by the pruned volume")
+    informed_sampling: bool | None = Field(None, description="sample where a route may improve")
+    sample_rejection: bool | None = Field(None, description="informed sampling by rejection")
+    new_state_rejection: bool | None = Field(None, description="reject states that can't help")
+    admissible_cost_to_come: bool | None = Field(None, description="bound costs by straight lines")
+    focus_search: bool | None = Field(None, description="all options that narrow the search")
+    k_nearest: bool | None = Field(None, description="choose neighbours by number")
+    use_k_nearest: bool | None = Field(None, description="choose neighbours by number")
+    nearest_k: bool | None = Field(None, description="choose neighbours by number")
     strict_queue_ordering: bool | None = Field(None, description="keep the queue sorted")
-    delay_rewiring_until_initial_solution: bool | None = Field(
-        None, description="rewire only after the first route"
-    )
-    just_in_time_sampling: bool | None = Field(
-        None, description="sample only where the search needs samples next"
-    )
-    drop_samples_on_prune: bool | None = Field(
-        None, description="discard unconnected samples when pruning"
-    )
-    stop_on_soln_improvement: bool | None = Field(
-        None, description="stop at each improvement of the route"
-    )
-    cache_cc: bool | None = Field(None, description="cache the results of edge checks")
-    heuristics: bool | None = Field(None, description="order the search by a cost-to-go heuristic")
-    extended_fmt: bool | None = Field(
-        None, description="add samples where the first ones do not suffice"
-    )
+    delay_rewiring_until_initial_solution: bool | None = Field(None, description="rewire later")
+    just_in_time_sampling: bool | None = Field(None, description="sample where needed next")
+    drop_samples_on_prune: bool | None = Field(None, description="discard samples when pruning")
+    stop_on_soln_improvement: bool | None = Field(None, description="stop at each improvement")
+    cache_cc: bool | None = Field(None, description="cache the checks of edges")
+    heuristics: bool | None = Field(None, description="order the search by a heuristic")
+    extended_fmt: bool | None = Field(None, description="add samples where required")
 
     def parameters(self) -> dict[str, float]:
         """Return the parameters that are set, by name."""

@@ -124,8 +124,8 @@ class RoadmapQuery:
             return graph.weights
         tails, heads = graph.vertices[graph.edges, 2].T
         turns = np.abs(np.remainder(heads - tails + math.pi, 2.0 * math.pi) - math.pi)
-        costs: Floats = graph.weights + settings.yaw_weight * turns
-        return costs
+        weighted: Floats = graph.weights + settings.yaw_weight * turns
+        return weighted
 
     def _build_adjacency(self, edges: Ints, cost: Floats) -> None:
         """Sort the edges and their reverses by their tails."""
