@@ -58,7 +58,7 @@ def ticking(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in ("engine", "solve", "registry"):
         monkeypatch.setattr(f"planners.{module}.now", lambda: TICK * next(looks))
     monkeypatch.setattr(
-        "planners.sampling.ompl_states.SOON", math.inf
+        "planners.sampling.ompl_states.POLL_INTERVAL", math.inf
     )  # looks by calls, not by time
 
 

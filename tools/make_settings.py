@@ -13,7 +13,8 @@ from pydantic.fields import FieldInfo
 
 from planners import OWN_PLANNERS, SamplingSettings
 from planners.sampling.ompl_module import has_parameter, samplers
-from planners.sampling.settings import PARAMETERS, refusal
+from planners.sampling.ompl_parameters import PARAMETERS
+from planners.sampling.settings import refusal
 from planners.search.base import SearchSettings
 
 FILE = Path(__file__).parents[1] / "docs" / "settings.md"

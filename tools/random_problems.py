@@ -14,9 +14,10 @@ from planners import PlanningProblem, SamplingSettings
 from planners.problem.costs import CostSettings
 from planners.problem.problem import Unknown
 from planners.registry import OWN_PLANNERS
-from planners.sampling.objectives import HEEDING
+from planners.sampling.objectives import COST_AWARE
 from planners.sampling.ompl_module import has_parameter, samplers
-from planners.sampling.settings import PARAMETERS, TURNING, StateSpace, refusal
+from planners.sampling.ompl_parameters import PARAMETERS
+from planners.sampling.settings import TURNING, StateSpace, refusal
 
 RESOLUTIONS = (-2.0, 3.0)  # decimal logarithm of a cell's side [m]
 ORIGINS = (0.0, 7.0)  # decimal logarithm of the distance of the grid's origin [m]
@@ -26,7 +27,7 @@ CAR = np.array([(-0.5, -0.45), (1.5, -0.45), (1.5, 0.45), (-0.5, 0.45)])
 ELL = np.array([(-0.4, -0.4), (1.2, -0.4), (1.2, 0.0), (0.0, 0.0), (0.0, 0.8), (-0.4, 0.8)])
 UNKNOWN, CONTESTED = 0.0, 0.005  # confidence
 UNIFORM = ("jps", "jps+", "lazy_theta", "polyanya", "theta")  # they need uniform costs
-WEIGHING = (HEEDING | OWN_PLANNERS.keys()) - set(UNIFORM)  # planners that take costs into account
+WEIGHING = (COST_AWARE | OWN_PLANNERS.keys()) - set(UNIFORM)  # planners that consider costs
 
 
 class Attempt(NamedTuple):

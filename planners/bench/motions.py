@@ -20,7 +20,8 @@ from groundmap.arrays import Bools, Floats
 from planners.costmap.costmap import Costmap
 from planners.errors import ProblemError
 from planners.problem.problem import PlanningProblem, Pose
-from planners.sampling.motion_validator import Bounds, MotionValidator
+from planners.sampling.motion_validator import Bounds
+from planners.sampling.motion_validator2d import MotionValidator2D
 from planners.sampling.ompl_module import ompl, redirect_log
 from planners.sampling.ompl_states import edge_check, information_of, reader, space_of, state_of
 from planners.sampling.settings import SamplingSettings, StateSpace
@@ -36,7 +37,7 @@ COMPILED, LAMBDA, REACH = "compiled", "lambda", "compiled, own range"
 class MotionQuery(NamedTuple):
     """Start, goal, and the bounds that OMPL samples in."""
 
-    validator: MotionValidator
+    validator: MotionValidator2D
     start: Pose  #: state of the validator
     goal: Pose  #: state of the validator
     room: Bounds
@@ -61,7 +62,8 @@ def compare_motions(
 
     The space is "r2" for a radius and "se2" for an outline. Rows of the workload "motions" repeat
     the checks of the edges that RRT-Connect needed. Rows of "first route" are searches of
-    RRT-Connect, with OMPL's default range and, in the last row, that of `MotionValidator.reach`.
+    RRT-Connect, with OMPL's default range and, in the last row, that of
+    `MotionValidator.max_edge_length`.
 
     Parameters
     ----------
@@ -151,12 +153,12 @@ def _solvable_queries(
             problem = PlanningProblem(
                 grid, start=start, goal=goal, footprint=footprint, clear_start=False
             )
-            validator = MotionValidator(
+            validator = MotionValidator2D(
                 Costmap.of(problem), "r2" if problem.shape.is_disc else "se2", 1.0
             )
         ends = validator.state_of(start), validator.state_of(goal)
         if all(validator.is_clear(*end, *end) for end in ends):
-            room = validator.room(*ends)
+            room = validator.bounds(*ends)
             if room is not None:
                 solvable.append(MotionQuery(validator, *ends, room))
     if not solvable:
@@ -193,7 +195,7 @@ def _record_edges(check: Callable[..., bool], read: Any, edges: list[Any]) -> Ca
     return record
 
 
-def _set_steps(space: Any, validator: MotionValidator) -> None:
+def _set_steps(space: Any, validator: MotionValidator2D) -> None:
     """Set OMPL's steps: no point of the footprint moves by more than about one cell."""
     size = validator.costmap.window.resolution
     plane = space if validator.space == "r2" else space.getSubspace(0)
@@ -204,7 +206,7 @@ def _set_steps(space: Any, validator: MotionValidator) -> None:
         yaw.setLongestValidSegmentFraction(min(turn / yaw.getMaximumExtent(), 1.0))
 
 
-def lambda_of(validator: MotionValidator) -> Callable[[Any], bool]:
+def lambda_of(validator: MotionValidator2D) -> Callable[[Any], bool]:
     """Return a state validity checker in Python.
 
     In "r2" a state is valid if its cell is traversable. In "se2" it is valid if none of the cells
@@ -228,7 +230,7 @@ def lambda_of(validator: MotionValidator) -> Callable[[Any], bool]:
     return is_valid
 
 
-def _outline(validator: MotionValidator) -> Floats:
+def _outline(validator: MotionValidator2D) -> Floats:
     """Return about 40 points on the outline, evenly spaced on each side [m, base_link]."""
     corners = np.asarray(validator.costmap.problem.shape.polygon)
     closed = np.concatenate([corners, corners[:1]])
@@ -274,7 +276,8 @@ def _edges_of(query: MotionQuery, seed: int, limit: float) -> list[tuple[Pose, P
 def _first_route(query: MotionQuery, system: str, seed: int, limit: float) -> Search:
     """Search for a first route with one of the checks."""
     validator = query.validator
-    longest = validator.reach(validator.region(query.start), query.room) if system == REACH else 0.0
+    region = validator.region(query.start)
+    longest = validator.max_edge_length(region, query.room) if system == REACH else 0.0
     return _search(query, _information(query, system), seed=seed, longest=longest, limit=limit)
 
 

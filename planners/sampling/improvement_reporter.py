@@ -1,4 +1,4 @@
-"""What somebody who waits for a search is told, and when they have heard enough."""
+"""Reports of improved routes to the caller of an anytime search."""
 
 from __future__ import annotations
 
@@ -9,55 +9,68 @@ import numpy as np
 from groundmap.arrays import Floats
 from planners.search.base import Clock, Improvement, OnImproved
 
-UNTOLD: Floats = np.empty((0, 2))  # waypoints of a route that OMPL doesn't show yet
+NO_WAYPOINTS: Floats = np.empty((0, 2))  # of routes that OMPL does not expose while it searches
 
 
 class ImprovementReporter:
-    """Tells of every better route.
+    """Calls back with each route that is cheaper than all before.
 
     Parameters
     ----------
     clock : Clock
-    tell : callable, optional
-        As in `planners.plan`.
+    callback : callable, optional
+        As `on_improved` of `planners.plan`.
 
     Attributes
     ----------
     cost : float
         Of the best route so far; infinite before the first.
-    since : float [s]
-        When the first route came; infinite before.
-    enough : bool
-        Whether who was told wants no better one.
-    fault : int or None
-        The `id` of what who was told has raised; kept itself, it would keep OMPL's objects.
+    first_at : float [s]
+        Time of the first route; infinite before.
+    should_stop : bool
+        Whether the callback asked to stop.
+    error_id : int or None
+        The `id` of an error that the callback raised. The error itself is not stored: its traceback
+        would keep OMPL's objects alive.
     """
 
-    def __init__(self, clock: Clock, tell: OnImproved | None) -> None:
-        self.clock, self.tell = clock, tell
-        self.cost, self.since, self.enough = math.inf, math.inf, False
-        self.fault: int | None = None
+    def __init__(self, clock: Clock, callback: OnImproved | None) -> None:
+        self.clock, self.callback = clock, callback
+        self.cost, self.first_at, self.should_stop = math.inf, math.inf, False
+        self.error_id: int | None = None
 
-    def report(self, cost: float, waypoints: Floats = UNTOLD) -> None:
-        """Take note of a route, and tell of it if it is better than those before."""
+    def report(self, cost: float, waypoints: Floats = NO_WAYPOINTS) -> None:
+        """Report a route if it is cheaper than all before.
+
+        Parameters
+        ----------
+        cost : float
+        waypoints : ndarray, shape (n, 2) or (n, 3) [m, map], optional
+        """
         if cost < self.cost:
-            self._say(cost, waypoints)
+            self._call(cost, waypoints)
 
-    def ends(self, cost: float, waypoints: Floats) -> None:
-        """Tell of the route that is handed out: the last word, with its waypoints."""
-        self._say(min(cost, self.cost), waypoints)
+    def report_final(self, cost: float, waypoints: Floats) -> None:
+        """Report the route that is returned; this is the last call.
 
-    def has_had(self, seconds: float) -> bool:
-        """Whether so much time has passed since the first route."""
-        return self.clock.seconds - self.since >= seconds
+        Parameters
+        ----------
+        cost : float
+        waypoints : ndarray, shape (n, 2) or (n, 3) [m, map]
+        """
+        self._call(min(cost, self.cost), waypoints)
 
-    def _say(self, cost: float, waypoints: Floats) -> None:
-        self.cost, self.since = cost, min(self.since, self.clock.seconds)
-        if self.tell is None or self.enough:
+    def has_improved_for(self, seconds: float) -> bool:
+        """Whether this time [s] has passed since the first route."""
+        return self.clock.seconds - self.first_at >= seconds
+
+    def _call(self, cost: float, waypoints: Floats) -> None:
+        self.cost, self.first_at = cost, min(self.first_at, self.clock.seconds)
+        if self.callback is None or self.should_stop:
             return
         try:
-            enough = self.tell(Improvement(cost, math.inf, self.clock.seconds, waypoints))
+            should_stop = self.callback(Improvement(cost, math.inf, self.clock.seconds, waypoints))
         except BaseException as error:
-            self.fault = id(error)
+            self.error_id = id(error)
             raise
-        self.enough = bool(enough)
+        self.should_stop = bool(should_stop)

@@ -1,4 +1,4 @@
-"""What sampling planners make small: the length, what the map adds to it, and the time."""
+"""Objective of sampling planners: the length, the costs of the map's cells, and the time."""
 
 from __future__ import annotations
 
@@ -30,59 +30,57 @@ from planners.sampling.kernels.edge_costs import (
 from planners.sampling.kernels.edges import ARM, BULGE
 from planners.sampling.kernels.edges import TURNING as TURNING_RADIUS
 from planners.sampling.motion_validator import MotionValidator
-from planners.sampling.motion_validator3d import MotionValidator3D
-from planners.sampling.ompl_states import Glance, reader
+from planners.sampling.ompl_states import PollSchedule, reader
 from planners.sampling.settings import FLAT, TURNING, SamplingSettings, StateSpace
 
-# Planners that compare costs while they search. OMPL doesn't tell: the others take an objective,
-# too, and never ask it. PRM and PRM* would, from a thread of their own, which waits for Python's
-# lock while the search that holds it waits for the thread: it never ends.
-HEEDING = frozenset({"bfmt", "bitstar", "fmt", "informedrrtstar", "rrtstar", "sorrtstar"})
-# There, FMT asks for hundreds of thousands of costs between two looks at the clock, and its twin
-# can't plan at all.
-HEEDLESS_FORWARD = frozenset({"bfmt", "fmt"})
-SURE = 1.0 - 1e-10  # share of a lower bound that rounding leaves below the cost
+# Planners that compare costs while they search; the others accept an objective and never use it.
+# PRM and PRM* would use it in threads of their own, which deadlocks: a thread waits for Python's
+# interpreter lock, whose holder waits for the thread.
+COST_AWARE = frozenset({"bfmt", "bitstar", "fmt", "informedrrtstar", "rrtstar", "sorrtstar"})
+# In dubins, FMT evaluates hundreds of thousands of costs between two termination checks, and BFMT
+# is not supported.
+NOT_COST_AWARE_IN_DUBINS = frozenset({"bfmt", "fmt"})
+BOUND_FACTOR = 1.0 - 1e-10  # keeps a lower bound below the cost in spite of rounding
 
 
 class Objective:
-    """What a path costs.
+    """Cost of a path.
 
-    ``length_weight`` times its length, plus what the map's costs add to each metre of base_link's
-    line, plus ``time_weight`` times the seconds it takes.
+    It is ``length_weight`` times the length, plus the map's costs along the line of base_link,
+    plus ``time_weight`` times the duration [s].
 
     Parameters
     ----------
-    validator : MotionValidator or MotionValidator3D
+    validator : MotionValidator
         On a 3-D map, all metres cost the same.
     settings : SamplingSettings
 
     Attributes
     ----------
     is_native : bool
-        Whether the cheapest path is the shortest one, so that OMPL's own objective does. Its cost
-        is what OMPL calls the length, in metres: in "se2", a radian counts as ``yaw_weight`` of
-        them.
+        Whether the cheapest path is the shortest one, so that OMPL's own objective is used. Its
+        cost is OMPL's length [m]: in se2, a radian counts as ``yaw_weight`` metres.
     edge, least : callable
-        Take the numbers of two states. What the edge between them costs, as OMPL counts; what no
-        path between them can cost less than.
+        Take the coordinates of two states; return OMPL's cost of the edge between them, and a
+        lower bound of the cost of any path between them.
     scale : float
-        What OMPL's costs are multiplied by: 1, but for its own objective.
+        Factor on OMPL's costs: 1, except with its own objective.
 
     Raises
     ------
     SettingsError
-        Nothing costs anything.
+        All costs are zero.
 
     Notes
     -----
-    The length is that of the route: a curve's is that of the chords between its poses, of which
-    the cells count that they cross. A metre in a cell costs what the costmap says, extra; in cells
-    where only a part of them, or only some headings, leave room for the footprint, it costs as
-    much as the dearest metre there can be.
+    The length is that of the route. For a curve it is that of the chords between its poses, which
+    also determine the cells that are crossed. The costmap's cost of a cell is added to each metre
+    in it; in cells where the footprint fits only in a part, or only at some headings, a metre has
+    the greatest possible cost.
 
-    Seconds are those at full speed: the length over ``max_speed``. Where base_link turns while it
-    drives, in "se2" and along arcs, it takes as long as the slower of both: the length, along the
-    arc, or the turn over ``max_turn_rate``. Nothing is added for speeding up and down.
+    The duration is that at full speed: the length over ``max_speed``. Where base_link turns while
+    it drives, in se2 and along arcs, it is the longer of the length along the arc over
+    ``max_speed`` and the turn over ``max_turn_rate``. Acceleration is not modelled.
 
     Examples
     --------
@@ -96,7 +94,7 @@ class Objective:
     >>> grid.fuse(np.array([0, 0]), field)
     >>> costs = CostSettings(confidence_weight=2.0)
     >>> problem = PlanningProblem(grid, start=(4, 4), goal=(30, 4), footprint=0.9, costs=costs)
-    >>> validator = MotionValidator(Costmap.of(problem), "r2", 1.0)
+    >>> validator = MotionValidator2D(Costmap.of(problem), "r2", 1.0)
     >>> objective = Objective(validator, SamplingSettings())
     >>> states = [validator.state_of(xy) for xy in ((4, 12), (10, 12), (10, 20))]
     >>> objective.cost(states[:2]), objective.cost(states), objective.is_native
@@ -106,86 +104,95 @@ class Objective:
     edge: Callable[..., float]
     least: Callable[..., float]
 
-    def __init__(
-        self, validator: MotionValidator | MotionValidator3D, settings: SamplingSettings
-    ) -> None:
+    def __init__(self, validator: MotionValidator, settings: SamplingSettings) -> None:
         self.space: StateSpace = validator.space
-        costmap = validator.costmap if isinstance(validator, MotionValidator) else None
-        plain = costmap is None or costmap.uniform
-        if plain and settings.length_weight == 0 and settings.time_weight == 0:
+        costmap = validator.costmap if isinstance(validator.costmap, Costmap) else None
+        is_uniform = costmap is None or costmap.uniform
+        if is_uniform and settings.length_weight == 0 and settings.time_weight == 0:
             expected = "more than 0, as nothing else costs anything"
             raise SettingsError("length_weight", expected, "0")
-        self.is_native = plain and not _turns_take_time(self.space, settings)
+        self.is_native = is_uniform and not _turns_take_time(self.space, settings)
         speed = settings.length_weight + settings.time_weight / settings.max_speed
         self.scale = speed if self.is_native else 1.0
-        self._metre = self.scale  # what a metre costs at least
+        self._cost_per_metre = self.scale  # at least
         if costmap is None:
             self.edge = self.least = _distance
         elif self.is_native:
-            self.edge = self.least = _native(costmap, self.space, settings)
+            self.edge = self.least = _ompl_length(costmap, self.space, settings)
         else:
             self.edge = _edge(costmap, self.space, settings)
             self.least = _least(costmap, self.space, settings)
-            self._metre = _metre(costmap, settings) + settings.time_weight / settings.max_speed
+            per_second = settings.time_weight / settings.max_speed
+            self._cost_per_metre = _least_cost_per_metre(costmap, settings) + per_second
 
     def cost(self, states: Sequence[Pose]) -> float:
-        """Return what a path costs."""
+        """Return the cost of a path."""
         return self.scale * math.fsum(self.edge(*a, *b) for a, b in pairwise(states))
 
-    def longest(self, cost: float) -> float:
-        """Return how long a path is at most that costs so much [m]."""
-        return cost / self._metre if self._metre > 0 else math.inf
+    def max_length(self, cost: float) -> float:
+        """Return an upper bound of the length of a path of a given cost [m]."""
+        return cost / self._cost_per_metre if self._cost_per_metre > 0 else math.inf
 
     def check(self, planner: str) -> None:
-        """Check that a planner heeds the objective, or need not.
+        """Check that a planner supports the objective.
 
         Raises
         ------
         ProblemError
-            It looks at lengths only; the sentence names those that don't.
+            The planner minimises the length only; the message names those that support it.
         """
-        heeding = HEEDING - HEEDLESS_FORWARD if self.space == "dubins" else HEEDING
-        if not self.is_native and planner not in heeding:
-            expected = f"one that heeds costs and times in {self.space!r}"
-            hint = f"Take one of these: {', '.join(sorted(heeding))}."
+        cost_aware = COST_AWARE - (NOT_COST_AWARE_IN_DUBINS if self.space == "dubins" else set())
+        if not self.is_native and planner not in cost_aware:
+            expected = f"one that supports costs and times in {self.space!r}"
+            hint = f"Take one of these: {', '.join(sorted(cost_aware))}."
             raise ProblemError("planner", expected, repr(planner), hint=hint)
 
-    def as_ompl(self, base: Any, information: Any, look: Callable[[], None]) -> Any:
-        """Return the objective as OMPL takes it; it looks around now and then."""
+    def to_ompl(self, base: Any, information: Any, poll: Callable[[], None]) -> Any:
+        """Return the objective as OMPL's.
+
+        Parameters
+        ----------
+        base : module
+            OMPL's.
+        information : object
+            OMPL's space information.
+        poll : callable
+            Called at intervals; it may raise to end the search.
+        """
         if self.is_native:
             return base.PathLengthOptimizationObjective(information)
-        read, cost, nothing = reader(self.space), base.Cost, base.Cost(0.0)
-        calls, glance = count(1), Glance(look)
+        read, ompl_cost, zero = reader(self.space), base.Cost, base.Cost(0.0)
+        calls, schedule = count(1), PollSchedule(poll)
 
-        def priced(price: Callable[..., float]) -> Callable[..., Any]:
+        def to_method(cost: Callable[..., float]) -> Callable[..., Any]:
             def method(_: Any, a: Any, b: Any) -> Any:
-                if (call := next(calls)) >= glance.due:
-                    glance(call)
-                return cost(price(*read(a), *read(b)))
+                if (call := next(calls)) >= schedule.due:
+                    schedule(call)
+                return ompl_cost(cost(*read(a), *read(b)))
 
             return method
 
         # The class is made here: one that outlives the search is reported as a leak at exit.
         methods = {
-            "stateCost": lambda _, state: nothing,
-            "motionCost": priced(self.edge),
-            "motionCostHeuristic": priced(self.least),
+            "stateCost": lambda _, state: zero,
+            "motionCost": to_method(self.edge),
+            "motionCostHeuristic": to_method(self.least),
         }
         return type("Costs", (base.OptimizationObjective,), methods)(information)
 
 
 def _turns_take_time(space: StateSpace, settings: SamplingSettings) -> bool:
-    """Whether the seconds of a path are not simply its length over the speed."""
+    """Whether the duration of a path is not simply its length over the speed."""
     if settings.time_weight == 0 or space in FLAT:
         return False
-    tightest = settings.max_turn_rate * settings.turning_radius
-    return space not in TURNING or tightest < settings.max_speed
+    speed_on_arcs = settings.max_turn_rate * settings.turning_radius
+    return space not in TURNING or speed_on_arcs < settings.max_speed
 
 
-def _native(
+def _ompl_length(
     costmap: Costmap, space: StateSpace, settings: SamplingSettings
 ) -> Callable[..., float]:
-    """Return OMPL's distance between two states."""
+    """Return a function for OMPL's distance between two states."""
     if space == "r2":
         return _distance
     numbers = _numbers(costmap, settings)
@@ -199,22 +206,23 @@ def _native(
 
 def _edge(costmap: Costmap, space: StateSpace, settings: SamplingSettings) -> Callable[..., float]:
     costs = np.minimum(costmap.costs, MAX_NON_OBSTACLE)
-    told = costs, _numbers(costmap, settings), _prices(costmap, settings)
+    shared = costs, _numbers(costmap, settings), _prices(costmap, settings)
     if space == "r2":
-        return partial(line_cost, *told)
+        return partial(line_cost, *shared)
     if space == "se2":
-        return partial(slide_cost, *told)
-    return partial(curve_cost, space == "dubins", *told)
+        return partial(slide_cost, *shared)
+    return partial(curve_cost, space == "dubins", *shared)
 
 
 def _least(costmap: Costmap, space: StateSpace, settings: SamplingSettings) -> Callable[..., float]:
-    """Return what gives the cost of the shortest path between two states over the cheapest cells.
+    """Return a function for the cost of the shortest path over the cheapest cells.
 
-    Of curves, that is the shortest one, and not the straight line: it tells far more. It is less
-    than any real cost by more than rounding: BIT* prunes what can't improve its route, and where
-    rounding made this bound the larger one, it pruned vertices of the route itself and crashed.
+    For curves this is the shortest curve, a far tighter bound than the straight line. It is less
+    than any real cost by more than rounding errors: BIT* prunes states that can't improve its
+    route, and with a bound above the real cost it prunes the route's own vertices and crashes.
     """
-    metre, second = SURE * _metre(costmap, settings), SURE * settings.time_weight
+    metre = BOUND_FACTOR * _least_cost_per_metre(costmap, settings)
+    second = BOUND_FACTOR * settings.time_weight
     drive, turn = second / settings.max_speed, second / settings.max_turn_rate
     if space == "r2":
         return lambda ax, ay, bx, by: (metre + drive) * math.hypot(bx - ax, by - ay)
@@ -231,8 +239,8 @@ def _least(costmap: Costmap, space: StateSpace, settings: SamplingSettings) -> C
     return lambda ax, ay, a, bx, by, b: least(length_of(ax, ay, a, bx, by, b), a, b)
 
 
-def _metre(costmap: Costmap, settings: SamplingSettings) -> float:
-    """Return what a metre costs at least, beside the time it takes."""
+def _least_cost_per_metre(costmap: Costmap, settings: SamplingSettings) -> float:
+    """Return the least cost of a metre, without its duration."""
     cheapest = min(int(costmap.costs.min()), MAX_NON_OBSTACLE)
     return settings.length_weight + costmap.top * cheapest / MAX_NON_OBSTACLE
 
@@ -259,8 +267,8 @@ def _prices(costmap: Costmap, settings: SamplingSettings) -> Floats:
 
 
 def _shortest_chord(numbers: Floats) -> float:
-    """Return the least share that a chord between two poses may be of its arc."""
-    # As `cuts` does it: steps are half a cell long at most, and leave their chord by the bulge.
+    """Return the least ratio of a chord between two poses to its arc."""
+    # As in `cuts`: steps are at most half a cell long, and deviate from their chord by the bulge.
     radius, arm, bulge = map(float, numbers[[TURNING_RADIUS, ARM, BULGE]])
     half = min(math.acos(max(1.0 - bulge / (radius + arm), 0.0)), 0.25 / radius)
     return math.sin(half) / half

@@ -1,4 +1,4 @@
-"""Searches with OMPL take turns: its random numbers and its log are global."""
+"""A lock that lets one search with OMPL run at a time: its random numbers and log are global."""
 
 from __future__ import annotations
 
@@ -10,60 +10,60 @@ from contextlib import contextmanager
 
 from planners.search.base import Cancel, Clock, now
 
-PATIENCE = 0.1  # [s] between two looks at the clock, while another search runs
-FAREWELL = 5.0  # [s] that the interpreter's end waits for a search
-_alone = threading.RLock()
-_leaving = threading.Event()
+POLL_INTERVAL = 0.1  # [s] between checks for cancellation while another search runs
+EXIT_TIMEOUT = 5.0  # [s] that interpreter shutdown waits for a search
+_lock = threading.RLock()
+_exiting = threading.Event()
 
 
-class Ending:
-    """What ends a search: somebody's wish, or the interpreter's own end.
+class StopRequest:
+    """User cancellation or interpreter shutdown.
 
-    A daemon thread that is ended within OMPL takes the process with it.
+    At shutdown, a daemon thread that is killed within OMPL would crash the process.
 
     Parameters
     ----------
-    wish : Cancel, optional
+    cancel : Cancel, optional
     """
 
-    def __init__(self, wish: Cancel | None) -> None:
-        self.wish = wish
+    def __init__(self, cancel: Cancel | None) -> None:
+        self.cancel = cancel
 
     def is_set(self) -> bool:
-        """Whether the search is to end."""
-        return _leaving.is_set() or (self.wish is not None and self.wish.is_set())
+        """Whether the search has to end."""
+        return _exiting.is_set() or (self.cancel is not None and self.cancel.is_set())
 
 
-def _leave() -> None:
-    """Let the search end that runs in a daemon thread, and none begin."""
-    _leaving.set()
-    _alone.acquire(timeout=FAREWELL)
+def _stop_at_exit() -> None:
+    """Stop a search that runs in a daemon thread, and prevent others from starting."""
+    _exiting.set()
+    _lock.acquire(timeout=EXIT_TIMEOUT)
 
 
-atexit.register(_leave)
+atexit.register(_stop_at_exit)
 
 
-def _renew() -> None:
-    """Take a new lock: a process that was forked off during a search has nobody who ends it."""
-    global _alone  # noqa: PLW0603 (a lock is the process's own)
-    _alone = threading.RLock()
+def _reset_after_fork() -> None:
+    """Create a new lock: in a child process, no thread would release one held at the fork."""
+    global _lock  # noqa: PLW0603 (each process has its own lock)
+    _lock = threading.RLock()
 
 
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_renew)
+    os.register_at_fork(after_in_child=_reset_after_fork)
 
 
 @contextmanager
-def turn(clock: Clock) -> Iterator[None]:
-    """Wait until no other search runs; time that is waited doesn't count.
+def hold_ompl(clock: Clock) -> Iterator[None]:
+    """Hold the lock; waiting for it does not count against the clock.
 
     Raises
     ------
     TimeLimitError, CancelledError
-        Time was up before, or somebody wants no search any more.
+        The time was up or the search was cancelled before the lock was free.
     """
-    alone, began = _alone, now()
-    while not alone.acquire(timeout=PATIENCE):
+    lock, began = _lock, now()
+    while not lock.acquire(timeout=POLL_INTERVAL):
         if clock.is_cancelled:
             clock.check(0)
     try:
@@ -71,4 +71,4 @@ def turn(clock: Clock) -> Iterator[None]:
         clock.check(0)
         yield
     finally:
-        alone.release()
+        lock.release()

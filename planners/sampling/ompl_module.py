@@ -1,4 +1,4 @@
-"""The only door to `ompl`, which the first question opens: its planners' names, its messages."""
+"""The only module that imports `ompl`, on first use: its planners, their parameters, its log."""
 
 from __future__ import annotations
 
@@ -11,13 +11,17 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from planners.sampling.settings import FIXED, setter_of
+from planners.sampling.ompl_parameters import setter_of
 
 LOG = logging.getLogger(__name__)
+# Parameters that a planner inherits but that crash it.
+CRASHING = {
+    ("sorrtstar", name) for name in ("focus_search", "informed_sampling", "sample_rejection")
+}
 
 
 class Modules(NamedTuple):
-    """OMPL."""
+    """OMPL's modules."""
 
     base: Any
     geometric: Any
@@ -25,7 +29,7 @@ class Modules(NamedTuple):
 
 
 def ompl() -> Modules:
-    """Return OMPL, loaded when first asked for."""
+    """Return OMPL's modules; the first call imports them."""
     from ompl import base, geometric, util
 
     return Modules(base, geometric, util)
@@ -33,27 +37,35 @@ def ompl() -> Modules:
 
 @cache
 def samplers() -> dict[str, str]:
-    """Return the names of the planners that OMPL offers, and of their classes; none without it."""
+    """Return the class names of OMPL's planners by planner name; empty without OMPL."""
     if find_spec("ompl") is None:
         return {}
     base, geometric, _ = ompl()
     classes = {name: getattr(geometric, name) for name in dir(geometric)}
     return {
         name.lower(): name
-        for name, found in classes.items()
-        if isinstance(found, type) and issubclass(found, base.Planner)
+        for name, cls in classes.items()
+        if isinstance(cls, type) and issubclass(cls, base.Planner)
     }
 
 
 def has_parameter(planner: str, name: str) -> bool:
-    """Whether one of OMPL's planners has a parameter."""
-    setters = getattr(ompl().geometric, samplers()[planner])
-    return (planner, name) not in FIXED and hasattr(setters, setter_of(name))
+    """Whether a planner supports a parameter.
+
+    Parameters
+    ----------
+    planner : str
+        As in `samplers`.
+    name : str
+        As in `planners.sampling.ompl_parameters.PARAMETERS`.
+    """
+    planner_class = getattr(ompl().geometric, samplers()[planner])
+    return (planner, name) not in CRASHING and hasattr(planner_class, setter_of(name))
 
 
 @contextmanager
 def redirect_log() -> Iterator[None]:
-    """Keep OMPL's messages off the console; log them if anybody listens at level DEBUG."""
+    """Suppress OMPL's messages; at level DEBUG, forward them to this module's logger."""
     util = ompl().util
     if not LOG.isEnabledFor(logging.DEBUG):
         util.noOutputHandler()
@@ -64,7 +76,7 @@ def redirect_log() -> Iterator[None]:
         return
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "log"
-        handler = util.OutputHandlerFile(str(file))  # OMPL holds no reference of its own
+        handler = util.OutputHandlerFile(str(file))  # OMPL keeps no reference to it
         util.useOutputHandler(handler)
         try:
             yield

@@ -1,7 +1,7 @@
 """One search with one of OMPL's planners.
 
-OMPL grows trees and roadmaps; whether a state or an edge is clear is decided by our own kernels,
-an edge in one call. Its answers are taken for what they are: only an exact solution is a path.
+OMPL grows trees and roadmaps; our own kernels check states and edges, one call per edge. Only an
+exact solution counts as a path.
 """
 
 from __future__ import annotations
@@ -13,83 +13,89 @@ from typing import Any
 
 from planners.problem.problem import Pose
 from planners.sampling.ompl_module import ompl, redirect_log, samplers
+from planners.sampling.ompl_parameters import setter_of
 from planners.sampling.ompl_states import (
-    drawing,
     edge_check,
     goal_of,
     information_of,
     reader,
+    sampler_allocator,
     space_of,
     state_check,
     state_of,
 )
 from planners.sampling.path_simplifier import simplify_path
 from planners.sampling.planner_data import graph_of
-from planners.sampling.settings import FLAT, setter_of
+from planners.sampling.settings import FLAT
 from planners.sampling.state_sampler import StateSampler
 from planners.sampling.task import Task, TaskResult
 from planners.sampling.threaded_solve import EXACT, collect_errors, solve_in_slices
 from planners.search.graph import Graph
 
-# Every other status of OMPL, and what it means to who asked. Starts and goals are checked before.
+# Messages for the statuses of failed searches. Starts and goals are checked before the search.
 REASONS = {
     "APPROXIMATE_SOLUTION": "the goal itself was not reached",
-    "TIMEOUT": "it gave up",
-    "UNKNOWN": "it doesn't say why",
-    "TYPE_COUNT": "it doesn't say why",
-    "INVALID_START": "it takes the start for no valid state",
-    "INVALID_GOAL": "it takes the goal for no valid state",
-    "UNRECOGNIZED_GOAL_TYPE": "it can't plan to such a goal",
-    "CRASH": "it crashed",
-    "ABORT": "it was stopped",
-    "INFEASIBLE": "it proved that there is none",
+    "TIMEOUT": "the planner gave up",
+    "UNKNOWN": "OMPL gives no reason",
+    "TYPE_COUNT": "OMPL gives no reason",
+    "INVALID_START": "OMPL rejected the start as invalid",
+    "INVALID_GOAL": "OMPL rejected the goal as invalid",
+    "UNRECOGNIZED_GOAL_TYPE": "the planner does not support this type of goal",
+    "CRASH": "the planner crashed",
+    "ABORT": "the planner was stopped",
+    "INFEASIBLE": "the planner proved that there is none",
 }
-THREADED = ("prm", "prmstar")  # they ask from threads of their own whether to stop
-# They take no state but by an edge, and the check of an edge is one of its ends, too.
-BY_EDGES = ("informedrrtstar", "kpiece1", "rrt", "rrtconnect", "rrtstar", "sorrtstar")
-GLANCE = 16  # questions whether to stop between two looks at the clock
-# [s] after time is up, a planner that has not asked is stopped in an edge's check, without a route
-# and with one, which is lost then.
-LATE, LATE_WITH_ROUTE = 0.1, 0.25
+THREADED = ("prm", "prmstar")  # evaluate the termination condition in threads of their own
+# Reach each state by an edge, whose check includes its ends: a check of states is not needed.
+EDGE_CHECKED = ("informedrrtstar", "kpiece1", "rrt", "rrtconnect", "rrtstar", "sorrtstar")
+POLL_EVERY = 16  # termination checks between two looks at the clock
+# [s] after the time is up, the check of an edge stops a planner that has not evaluated its
+# termination condition; with a route, which is then lost, it waits longer.
+GRACE, GRACE_WITH_ROUTE = 0.1, 0.25
 COST_TOLERANCE = 1e-9  # relative, of costs
-# [m] RRT-Connect cuts an edge to its goal short by driving on from the goal: forward only, that
-# leads to nowhere.
-UNCUT = 1e6
-SAMPLES = 1000  # that planners begin with which take all of their samples at first
+# [m] RRT-Connect shortens an edge to its goal by driving on from the goal: in dubins, such a state
+# does not lead to the goal.
+UNLIMITED_RANGE = 1e6
+INITIAL_SAMPLES = 1000  # of planners that draw all their samples first
 
 
-class _LateError(Exception):
-    """Time is up, and the planner doesn't ask: thrown through it."""
+class _OverdueError(Exception):
+    """The time is up and the planner does not evaluate its termination condition."""
 
 
 class OmplSearch:
-    """One search: OMPL's objects are made for it, and gone after it."""
+    """One search; OMPL's objects exist only during it.
+
+    Parameters
+    ----------
+    task : Task
+    """
 
     def __init__(self, task: Task) -> None:
         self.task, self.validator, self.settings = task, task.validator, task.settings
         self.clock, self.reporter = task.clock, task.reporter
-        self.edges, self.looks, self.late = count(1), 0, math.inf
+        self.edges, self.stop_checks, self.overdue_since = count(1), 0, math.inf
         self.read, self.ompl = reader(task.validator.space), ompl()
-        self.searching = task.name not in THREADED  # whose threads no exception may pass through
-        self.errors: list[BaseException] = []  # so they wait here
+        self.may_raise = task.name not in THREADED  # no exception may pass through their threads
+        self.errors: list[BaseException] = []  # of callbacks in such threads
         least = min(task.objective.least(*task.start, *goal) for goal in task.goals)
         self.optimum = least * (1.0 + COST_TOLERANCE)  # in OMPL's costs
 
-    def outcome(self) -> TaskResult:
-        """Search, and shorten what was found."""
+    def run(self) -> TaskResult:
+        """Return the result of the search, its path simplified."""
         with redirect_log():
             try:
-                return self._outcome()
-            except _LateError:
+                return self._run()
+            except _OverdueError:
                 return TaskResult("TIMEOUT", [], None, self._count_checked())
-            except RuntimeError as error:  # what C++ throws arrives as that
-                if id(error) == self.reporter.fault:
+            except RuntimeError as error:  # C++ exceptions arrive as this type
+                if id(error) == self.reporter.error_id:
                     raise
-                return TaskResult(f"OMPL says: {error}", [], None, self._count_checked())
+                return TaskResult(f"OMPL reports: {error}", [], None, self._count_checked())
 
-    def _outcome(self) -> TaskResult:
+    def _run(self) -> TaskResult:
         self.ompl.util.RNG.setSeed(self.settings.seed + 1)  # 0 is refused
-        space = space_of(self.ompl.base, self.validator.space, self.task.room, self.settings)
+        space = space_of(self.ompl.base, self.validator.space, self.task.bounds, self.settings)
         information = self._information(space)
         definition = self._definition(space, information)
         planner = getattr(self.ompl.geometric, samplers()[self.task.name])(information)
@@ -98,7 +104,7 @@ class OmplSearch:
         planner.setProblemDefinition(definition)
         planner.setup()
         status = self._solve(planner, definition)
-        self.searching, graph = False, None
+        self.may_raise, graph = False, None
         if self.settings.keep_graph:
             graph = graph_of(self.ompl.base, planner, information, self.validator)
         if not definition.hasSolution():
@@ -106,15 +112,15 @@ class OmplSearch:
         if status != EXACT:
             left = float(definition.getSolutionDifference())
             return TaskResult(status, [], left, self._count_checked(), graph)
-        return self._honest(information, definition.getSolutionPath(), graph)
+        return self._checked_result(definition.getSolutionPath(), graph)
 
     def _information(self, space: Any) -> Any:
-        """Return the space with our own checks of states and edges, and our own samples."""
+        """Return OMPL's space information with our own checks and samples."""
         base, task = self.ompl.base, self.task
         state = None
-        if task.name not in BY_EDGES:
-            state = self._guard(state_check(self.validator, self._look))
-        edge = self._guard(edge_check(self.validator, self.edges, self._look))
+        if task.name not in EDGE_CHECKED:
+            state = self._guard(state_check(self.validator, self._poll))
+        edge = self._guard(edge_check(self.validator, self.edges, self._poll))
         sampler = StateSampler(
             self.validator,
             task.region,
@@ -122,38 +128,40 @@ class OmplSearch:
             yaw_weight=self.settings.yaw_weight,
             first=task.first,
         )
-        allocator = drawing(base, sampler, self.validator.space)
+        allocator = sampler_allocator(base, sampler, self.validator.space)
         return information_of(base, space, edge, state=state, allocator=allocator)
 
     def _guard(self, check: Callable[..., bool]) -> Callable[..., bool]:
         return collect_errors(check, self.errors) if self.task.name in THREADED else check
 
     def _definition(self, space: Any, information: Any) -> Any:
-        """Return OMPL's problem: where from, where to, and what is best."""
+        """Return OMPL's problem definition: start, goals and objective."""
         base, kind = self.ompl.base, self.validator.space
         definition = base.ProblemDefinition(information)
         definition.addStartState(state_of(space, self.task.start, kind))
         goals = [state_of(space, goal, kind) for goal in self.task.goals]
         definition.setGoal(goal_of(base, information, goals))
-        objective = self.task.objective.as_ompl(base, information, self._look)
+        objective = self.task.objective.to_ompl(base, information, self._poll)
         definition.setOptimizationObjective(objective)
         return definition
 
     def _parameters(self, planner: Any) -> dict[str, float]:
-        """Return the planner's own parameters: what was told, and how far edges reach."""
-        told = self.settings.parameters()
-        if hasattr(planner, "setRange") and "range" not in told:
-            if (self.task.name, self.validator.space) == ("rrtconnect", "dubins"):
-                return told | {"range": UNCUT}
-            return told | {"range": self.validator.reach(self.task.region, self.task.room)}
-        return told
+        """Return the planner's parameters: the given ones, and the longest edge."""
+        task, parameters = self.task, self.settings.parameters()
+        if hasattr(planner, "setRange") and "range" not in parameters:
+            if (task.name, self.validator.space) == ("rrtconnect", "dubins"):
+                longest = UNLIMITED_RANGE
+            else:
+                longest = self.validator.max_edge_length(task.region, task.bounds)
+            parameters["range"] = longest
+        return parameters
 
     def _solve(self, planner: Any, definition: Any) -> str:
         """Run a planner until it ends or is to; return its status."""
         if self.task.name in THREADED:
             return solve_in_slices(planner, definition, self.task, self.errors)
         grows = hasattr(planner, "setNumSamples") and self.settings.num_samples is None
-        samples = SAMPLES
+        samples = INITIAL_SAMPLES
         while True:
             if grows:
                 planner.setNumSamples(samples)
@@ -165,57 +173,56 @@ class OmplSearch:
             planner.clear()
 
     def _count_checked(self) -> int:
-        """Return how many edges were checked, once: asking counts."""
+        """Return the number of edges checked; call it once, as it advances the counter."""
         return next(self.edges) - 1
 
     @property
     def _is_over(self) -> bool:
-        """Whether the search has had all it gets, and its route all the time to be bettered."""
+        """Whether the time, iteration or improvement budget is exhausted."""
         iterations = self.settings.iterations
-        if self.clock.is_up or self.reporter.enough:
+        if self.clock.is_up or self.reporter.should_stop:
             return True
         if iterations is not None:
-            return self.looks >= iterations
-        return self.reporter.has_had(self.settings.improve_for)
+            return self.stop_checks >= iterations
+        return self.reporter.has_improved_for(self.settings.improve_for)
 
-    def _look(self) -> None:
-        """Stop a search from within that doesn't ask whether to.
+    def _poll(self) -> None:
+        """Stop a search that does not evaluate its termination condition in time.
 
-        RRTConnect joins its trees, BIT* draws a batch, FMT grows a neighbourhood in one go.
+        RRTConnect joins its trees, BIT* draws a batch, and FMT expands a neighbourhood without
+        evaluating it.
         """
-        if self.searching and self.clock.is_up:
-            self.late = min(self.late, self.clock.seconds)
-            patience = LATE_WITH_ROUTE if math.isfinite(self.reporter.cost) else LATE
-            if self.clock.seconds >= self.late + patience:
-                raise _LateError
+        if self.may_raise and self.clock.is_up:
+            self.overdue_since = min(self.overdue_since, self.clock.seconds)
+            grace = GRACE_WITH_ROUTE if math.isfinite(self.reporter.cost) else GRACE
+            if self.clock.seconds >= self.overdue_since + grace:
+                raise _OverdueError
 
     def _stop(self, planner: Any) -> Callable[[], bool]:
-        """Return what a planner asks time and again: whether to stop.
-
-        Once yes, always yes: FMT crashes on a change of mind.
-        """
+        """Return a termination condition that stays true once it is: FMT crashes otherwise."""
         counted = self.settings.iterations is not None
-        betters, reporter = hasattr(planner, "bestCost"), self.reporter
-        scale, over = self.task.objective.scale, False
+        is_anytime, reporter = hasattr(planner, "bestCost"), self.reporter
+        scale, is_over = self.task.objective.scale, False
 
         def stop() -> bool:
-            nonlocal over
-            self.looks += 1
-            if betters:  # SORRT* looks for ever for what is better than the best there can be
-                over = over or planner.bestCost().value() <= self.optimum
-            if not over and (counted or self.looks % GLANCE == 0 or self.late < math.inf):
-                if betters and math.isfinite(cost := planner.bestCost().value()):
+            nonlocal is_over
+            self.stop_checks += 1
+            if is_anytime:  # SORRT* never ends its search for a sample that improves the optimum
+                is_over = is_over or planner.bestCost().value() <= self.optimum
+            is_overdue = self.overdue_since < math.inf
+            if not is_over and (counted or self.stop_checks % POLL_EVERY == 0 or is_overdue):
+                if is_anytime and math.isfinite(cost := planner.bestCost().value()):
                     reporter.report(scale * cost)
-                over = self._is_over
-            return over
+                is_over = self._is_over
+            return is_over
 
         return stop
 
-    def _honest(self, information: Any, path: Any, graph: Graph | None) -> TaskResult:
-        """Return the path, simplified if that made it better, all of its edges checked again."""
+    def _checked_result(self, path: Any, graph: Graph | None) -> TaskResult:
+        """Return the result with the path simplified, all of its edges checked again."""
         states = self._join_ends(path)
         if not self.validator.are_clear(states):
-            reason = "its path can't be driven"
+            reason = "its path is not clear"
             return TaskResult(reason, [], None, self._count_checked(), graph)
         self.reporter.report(self.task.objective.cost(states))
         if self.settings.simplify and len(states) > 2:
@@ -223,19 +230,19 @@ class OmplSearch:
         return TaskResult(EXACT, states, 0.0, self._count_checked(), graph)
 
     def _join_ends(self, path: Any) -> list[Pose]:
-        """Return the states of a path, from the very start to the very goal."""
+        """Return the states of a path, its ends replaced by the exact start and goal."""
         states = [self.read(state) for state in path.getStates()]
-        turns = self.validator.space not in FLAT
-        goal = min(self.task.goals, key=lambda goal: _apart(states[-1], goal, turns=turns))
+        has_yaw = self.validator.space not in FLAT
+        goal = min(self.task.goals, key=lambda goal: _distance(states[-1], goal, has_yaw=has_yaw))
         if len(states) > 1:
             states.pop()
         return [self.task.start, *states[1:], goal]
 
 
-def _apart(a: Pose, b: Pose, *, turns: bool) -> float:
-    """Return how far two states are apart: only to tell goals from each other."""
+def _distance(a: Pose, b: Pose, *, has_yaw: bool) -> float:
+    """Return a distance of two states that serves to find the goal of a path."""
     gaps = [p - q for p, q in zip(a, b, strict=True)]
-    if turns:
+    if has_yaw:
         gaps[2] = math.remainder(gaps[2], math.tau)
     return math.hypot(*gaps)
 

@@ -1,6 +1,6 @@
-"""OMPL's spaces and states, and what it calls back, without an import of it.
+"""OMPL's spaces, states and callbacks, without an import of OMPL.
 
-What is called back returns Python's own bool, and keeps no state: OMPL frees them.
+Callbacks return Python's own bool, and keep no reference to a state: OMPL frees it.
 """
 
 from __future__ import annotations
@@ -12,70 +12,79 @@ from typing import Any
 
 from planners.problem.problem import Pose
 from planners.sampling.motion_validator import Bounds, MotionValidator
-from planners.sampling.motion_validator3d import MotionValidator3D
 from planners.sampling.settings import FLAT, SamplingSettings, StateSpace
 from planners.sampling.state_sampler import StateSampler
 
-OFTEN = 256  # calls between two looks, at most
-SOON = 0.002  # [s] between two looks, about: a call takes microseconds, or milliseconds
+MAX_CALLS = 256  # most calls between two polls
+POLL_INTERVAL = 0.002  # [s] aimed at between two polls; a call takes microseconds to milliseconds
 
 
-class Glance:
-    """Decides when to look around between calls from OMPL, however long each of them takes.
+class PollSchedule:
+    """Polls at about regular times while OMPL calls back, for calls of any duration.
 
     Parameters
     ----------
-    look : callable
+    poll : callable
 
     Attributes
     ----------
     due : int
-        Number of the call, counted from 1, at which to look next.
+        Number of the call, counted from 1, at which to poll next.
 
     Examples
     --------
-    >>> looks = []
-    >>> glance = Glance(lambda: looks.append(None))
+    >>> polls = []
+    >>> schedule = PollSchedule(lambda: polls.append(None))
     >>> for call in range(1, 1001):
-    ...     if call >= glance.due:
-    ...         glance(call)
-    >>> 4 <= len(looks) <= 1000
+    ...     if call >= schedule.due:
+    ...         schedule(call)
+    >>> 4 <= len(polls) <= 1000
     True
     """
 
-    __slots__ = ("due", "last", "look", "step")
+    __slots__ = ("due", "last", "poll", "step")
 
-    def __init__(self, look: Callable[[], None]) -> None:
-        self.look, self.due, self.step = look, 1, 1
+    def __init__(self, poll: Callable[[], None]) -> None:
+        self.poll, self.due, self.step = poll, 1, 1
         self.last = time.perf_counter()
 
     def __call__(self, call: int) -> None:
-        """Work out when to look next, and look."""
+        """Schedule the next poll, and poll."""
         before, self.last = self.last, time.perf_counter()
-        hurried = self.last - before > SOON
-        self.step = max(self.step // 4, 1) if hurried else min(2 * self.step, OFTEN)
+        is_slow = self.last - before > POLL_INTERVAL
+        self.step = max(self.step // 4, 1) if is_slow else min(2 * self.step, MAX_CALLS)
         self.due = call + self.step
-        self.look()
+        self.poll()
 
 
-def space_of(base: Any, space: StateSpace, room: Bounds, settings: SamplingSettings) -> Any:
-    """Return a space of OMPL's within a box."""
-    axes = len(room) // 2
+def space_of(base: Any, space: StateSpace, bounds: Bounds, settings: SamplingSettings) -> Any:
+    """Return OMPL's state space within a box.
+
+    Parameters
+    ----------
+    base : module
+        OMPL's.
+    space : {"r2", "se2", "dubins", "reeds_shepp", "r3"}
+    bounds : tuple of float [m, corner]
+        Low x, y (, z), high x, y (, z).
+    settings : SamplingSettings
+    """
+    axes = len(bounds) // 2
     if space in FLAT:
-        made = base.RealVectorStateSpace(axes)
+        ompl_space = base.RealVectorStateSpace(axes)
     elif space == "se2":
-        made = base.SE2StateSpace()
-        made.setSubspaceWeight(1, settings.yaw_weight)
+        ompl_space = base.SE2StateSpace()
+        ompl_space.setSubspaceWeight(1, settings.yaw_weight)
     elif space == "dubins":
-        made = base.DubinsStateSpace(settings.turning_radius)
+        ompl_space = base.DubinsStateSpace(settings.turning_radius)
     else:
-        made = base.ReedsSheppStateSpace(settings.turning_radius)
-    bounds = base.RealVectorBounds(axes)
+        ompl_space = base.ReedsSheppStateSpace(settings.turning_radius)
+    ompl_bounds = base.RealVectorBounds(axes)
     for axis in range(axes):
-        bounds.setLow(axis, room[axis])
-        bounds.setHigh(axis, room[axis + axes])
-    made.setBounds(bounds)
-    return made
+        ompl_bounds.setLow(axis, bounds[axis])
+        ompl_bounds.setHigh(axis, bounds[axis + axes])
+    ompl_space.setBounds(ompl_bounds)
+    return ompl_space
 
 
 def information_of(
@@ -86,9 +95,20 @@ def information_of(
     state: Callable[[Any], bool] | None = None,
     allocator: Callable[[Any], Any] | None = None,
 ) -> Any:
-    """Return a space of OMPL's with our own checks of edges and states, and our own samples.
+    """Return OMPL's space information with callbacks for checks and samples.
 
-    Without a check of states, all are taken for clear.
+    Parameters
+    ----------
+    base : module
+        OMPL's.
+    space : object
+        OMPL's state space.
+    edge : callable
+        As of `edge_check`.
+    state : callable, optional
+        As of `state_check`; default: all states are valid.
+    allocator : callable, optional
+        As of `sampler_allocator`; default: OMPL's own sampler.
     """
     information = base.SpaceInformation(space)
     all_valid = base.AllValidStateValidityChecker(information)
@@ -103,76 +123,119 @@ def information_of(
 
 
 def state_of(space: Any, pose: Pose, kind: StateSpace) -> Any:
-    """Return a state of OMPL's."""
+    """Return a state as OMPL's.
+
+    Parameters
+    ----------
+    space : object
+        OMPL's state space.
+    pose : tuple of float
+        A state [m, corner; rad].
+    kind : {"r2", "se2", "dubins", "reeds_shepp", "r3"}
+        Of the space.
+    """
     state = space.allocState()
     writer(kind)(state, pose)
     return state
 
 
 def goal_of(base: Any, information: Any, goals: list[Any]) -> Any:
-    """Return OMPL's goal of several states, each of which will do."""
+    """Return OMPL's goal that any of several states satisfies.
+
+    Parameters
+    ----------
+    base : module
+        OMPL's.
+    information : object
+        OMPL's space information.
+    goals : list of objects
+        OMPL's states.
+    """
     goal = base.GoalStates(information)
     for state in goals:
         goal.addState(state)
     return goal
 
 
-def state_check(
-    validator: MotionValidator | MotionValidator3D, look: Callable[[], None]
-) -> Callable[[Any], bool]:
-    """Return what tells whether a state is clear, and looks around now and then."""
+def state_check(validator: MotionValidator, poll: Callable[[], None]) -> Callable[[Any], bool]:
+    """Return a callback that checks whether a state is clear, and polls at intervals.
+
+    Parameters
+    ----------
+    validator : MotionValidator
+    poll : callable
+        May raise to end the search.
+    """
     is_clear, read, states = validator.is_clear, reader(validator.space), count(1)
-    glance = Glance(look)
+    schedule = PollSchedule(poll)
 
     def check(state: Any) -> bool:
-        if (call := next(states)) >= glance.due:
-            glance(call)
+        if (call := next(states)) >= schedule.due:
+            schedule(call)
         return is_clear(*2 * read(state))
 
     return check
 
 
 def edge_check(
-    validator: MotionValidator | MotionValidator3D, edges: Iterator[int], look: Callable[[], None]
+    validator: MotionValidator, edges: Iterator[int], poll: Callable[[], None]
 ) -> Callable[..., bool]:
-    """Return a method that checks an edge and counts it, and looks around now and then.
+    """Return a method that checks and counts an edge, and polls at intervals.
 
-    OMPL's third argument stays as it is.
+    The method does not set OMPL's optional third argument, the last valid state. Each kind of
+    space has a method of its own, as unpacking a state by a call is measurably slower.
+
+    Parameters
+    ----------
+    validator : MotionValidator
+    edges : iterator of int
+        Counts the edges from 1.
+    poll : callable
+        May raise to end the search.
     """
-    is_clear, glance = validator.is_clear, Glance(look)
+    is_clear, schedule = validator.is_clear, PollSchedule(poll)
 
     def line(_: Any, a: Any, b: Any, __: Any = None) -> bool:
-        if (call := next(edges)) >= glance.due:
-            glance(call)
+        if (call := next(edges)) >= schedule.due:
+            schedule(call)
         return is_clear(a[0], a[1], b[0], b[1])
 
     def line_3d(_: Any, a: Any, b: Any, __: Any = None) -> bool:
-        if (call := next(edges)) >= glance.due:
-            glance(call)
+        if (call := next(edges)) >= schedule.due:
+            schedule(call)
         return is_clear(a[0], a[1], a[2], b[0], b[1], b[2])
 
     def poses(_: Any, a: Any, b: Any, __: Any = None) -> bool:
-        if (call := next(edges)) >= glance.due:
-            glance(call)
+        if (call := next(edges)) >= schedule.due:
+            schedule(call)
         return is_clear(a.getX(), a.getY(), a.getYaw(), b.getX(), b.getY(), b.getYaw())
 
     return {"r2": line, "r3": line_3d}.get(validator.space, poses)
 
 
-def drawing(base: Any, sampler: StateSampler, kind: StateSpace) -> Callable[[Any], Any]:
-    """Return what makes samplers of clear states."""
+def sampler_allocator(base: Any, sampler: StateSampler, kind: StateSpace) -> Callable[[Any], Any]:
+    """Return an allocator of OMPL's samplers of valid states.
+
+    Parameters
+    ----------
+    base : module
+        OMPL's.
+    sampler : StateSampler
+    kind : {"r2", "se2", "dubins", "reeds_shepp", "r3"}
+        Of the space.
+    """
     read, write = reader(kind), writer(kind)
 
     def sample(_: Any, state: Any) -> bool:
-        return _write(state, sampler.anywhere())
+        return _write(state, sampler.sample())
 
     def sample_near(_: Any, state: Any, near: Any, distance: float) -> bool:
-        return _write(state, sampler.near(read(near), distance))
+        return _write(state, sampler.sample_near(read(near), distance))
 
-    def _write(state: Any, drawn: Pose | None) -> bool:
-        if drawn is not None:
-            write(state, drawn)
-        return drawn is not None
+    def _write(state: Any, sampled: Pose | None) -> bool:
+        if sampled is not None:
+            write(state, sampled)
+        return sampled is not None
 
     # The class is made here: one that outlives the search is reported as a leak at exit.
     methods = {"sample": sample, "sampleNear": sample_near}
@@ -180,12 +243,12 @@ def drawing(base: Any, sampler: StateSampler, kind: StateSpace) -> Callable[[Any
 
 
 def reader(space: StateSpace) -> Callable[[Any], Pose]:
-    """Return what turns a state of OMPL's into ours."""
+    """Return a function that converts OMPL's state to a tuple."""
     return {"r2": _read_place, "r3": _read_place_3d}.get(space, _read_pose)
 
 
 def writer(space: StateSpace) -> Callable[[Any, Pose], None]:
-    """Return what sets a state of OMPL's to ours."""
+    """Return a function that sets OMPL's state to a tuple."""
     return _write_place if space in FLAT else _write_pose
 
 

@@ -1,4 +1,4 @@
-"""Paths of OMPL's planners, made cheaper: the cheapest way over places along them."""
+"""Simplification of paths: the cheapest path over intermediate places along a given one."""
 
 from __future__ import annotations
 
@@ -15,41 +15,40 @@ from planners.errors import CancelledError, TimeLimitError
 from planners.geometry.kernels.curves import wrap
 from planners.problem.problem import Pose
 from planners.sampling.motion_validator import MotionValidator
-from planners.sampling.motion_validator3d import MotionValidator3D
 from planners.sampling.objectives import Objective
-from planners.sampling.ompl_states import Glance
+from planners.sampling.ompl_states import PollSchedule
 from planners.sampling.settings import TURNING
 from planners.search.base import Clock
 
 T = TypeVar("T")
 
-PLACES = 48  # along a path, beside its states
-WINDOW = 150  # of them that are tried as the one before
+PLACES = 48  # number of places along a path, besides its states
+WINDOW = 150  # number of earlier places that are tried as predecessors
 ROUNDS = 6  # each with other places
-GAIN = 1e-3  # share of the cost below which another round is not worth it
-SHIFT = (math.sqrt(5.0) - 1.0) / 2.0  # of the places from round to round
+MIN_GAIN = 1e-3  # relative improvement below which no further round is made
+SHIFT = (math.sqrt(5.0) - 1.0) / 2.0  # offset of the places from round to round
 
 
 def simplify_path(
     states: Sequence[Pose],
-    validator: MotionValidator | MotionValidator3D,
+    validator: MotionValidator,
     objective: Objective,
     clock: Clock,
 ) -> list[Pose]:
     """Return a path that costs no more, from the same start to the same goal.
 
-    OMPL's own simplifier heeds lengths only, leaves out turns at places between states, and may
-    not end.
+    OMPL's own simplifier minimises lengths only, ignores turns at places between states, and may
+    not terminate.
 
     Parameters
     ----------
     states : sequence of states
         A clear path.
-    validator : MotionValidator or MotionValidator3D
+    validator : MotionValidator
     objective : Objective
-        What is to be small.
+        Minimised.
     clock : Clock
-        Once time is up, the best so far is returned.
+        Once the time is up, the best path so far is returned.
     """
     best, cost = list(states), objective.cost(states)
     for turn in range(ROUNDS):
@@ -62,32 +61,31 @@ def simplify_path(
         before, after = cost, objective.cost(trial)
         if after < before:
             best, cost = trial, after
-        if after > (1.0 - GAIN) * before:
+        if after > (1.0 - MIN_GAIN) * before:
             break
     return best
 
 
 def _cheapest(
     places: list[Pose],
-    validator: MotionValidator | MotionValidator3D,
+    validator: MotionValidator,
     objective: Objective,
     clock: Clock,
 ) -> list[Pose] | None:
-    """Return the cheapest path from the first place to the last, onwards; None if time is up."""
-    calls, glance = count(1), Glance(partial(clock.check, 0))
+    """Return the cheapest path over places in their order, or None if the time is up."""
+    calls, schedule = count(1), PollSchedule(partial(clock.check, 0))
 
-    def asked(question: Callable[..., T], i: int, j: int) -> T:
-        if (call := next(calls)) >= glance.due:
-            glance(call)
-        return question(*places[i], *places[j])
+    def evaluate(function: Callable[..., T], i: int, j: int) -> T:
+        if (call := next(calls)) >= schedule.due:
+            schedule(call)
+        return function(*places[i], *places[j])
 
     costs, came = [0.0], [0]
     try:
         for j in range(1, len(places)):
             begin = max(0, j - WINDOW)
-            befores = [(costs[i] + asked(objective.edge, i, j), i) for i in range(begin, j)]
-            befores.sort()
-            clear = (before for before in befores if asked(validator.is_clear, before[1], j))
+            ranked = sorted((costs[i] + evaluate(objective.edge, i, j), i) for i in range(begin, j))
+            clear = ((cost, i) for cost, i in ranked if evaluate(validator.is_clear, i, j))
             cost, i = next(clear, (math.inf, j - 1))
             costs.append(cost)
             came.append(i)
@@ -100,12 +98,9 @@ def _cheapest(
     return path[::-1]
 
 
-def _with_places(
-    validator: MotionValidator | MotionValidator3D, states: list[Pose], shift: float
-) -> list[Pose]:
-    """Return the states of a path, and places between them, about evenly along it."""
-    axes = 3 if validator.space == "r3" else 2
-    steps = [math.dist(a[:axes], b[:axes]) for a, b in pairwise(states)]
+def _with_places(validator: MotionValidator, states: list[Pose], shift: float) -> list[Pose]:
+    """Return the states of a path and places between them, about equally spaced."""
+    steps = [math.dist(a[: validator.axes], b[: validator.axes]) for a, b in pairwise(states)]
     share = PLACES / sum(steps) if any(steps) else 0.0
     places = []
     for a, b, step in zip(states, states[1:], steps, strict=False):
@@ -114,10 +109,8 @@ def _with_places(
     return [*places, states[-1]]
 
 
-def _between(
-    validator: MotionValidator | MotionValidator3D, a: Pose, b: Pose, shares: Floats
-) -> list[Pose]:
-    """Return places along an edge, at shares of its length."""
+def _between(validator: MotionValidator, a: Pose, b: Pose, shares: Floats) -> list[Pose]:
+    """Return places along an edge at the given shares of its length."""
     if len(shares) == 0:
         return []
     if validator.space in TURNING:

@@ -1,4 +1,4 @@
-"""Planners that sample, as engines: what is asked is checked before, and what OMPL brings after."""
+"""The engine of sampling planners: validates a query, runs OMPL, and converts its result."""
 
 from __future__ import annotations
 
@@ -20,48 +20,51 @@ from planners.errors import (
     UnsolvedError,
 )
 from planners.problem.problem import Pose
-from planners.sampling.goal_sampling import come_near, goal_states
+from planners.sampling.goal_sampling import goal_states, may_contain_goal
 from planners.sampling.improvement_reporter import ImprovementReporter
 from planners.sampling.motion_validator import MotionValidator, box_of
+from planners.sampling.motion_validator2d import MotionValidator2D
 from planners.sampling.motion_validator3d import MotionValidator3D
 from planners.sampling.objectives import Objective
-from planners.sampling.ompl_lock import Ending, turn
+from planners.sampling.ompl_lock import StopRequest, hold_ompl
 from planners.sampling.ompl_module import has_parameter
+from planners.sampling.ompl_parameters import PARAMETERS
 from planners.sampling.ompl_search import REASONS, THREADED, OmplSearch
 from planners.sampling.path_simplifier import simplify_path
 from planners.sampling.search_result import to_search_result
-from planners.sampling.settings import FLAT, PARAMETERS, SamplingSettings, StateSpace, refusal
+from planners.sampling.settings import FLAT, SamplingSettings, StateSpace, refusal
 from planners.sampling.task import Task, TaskResult
 from planners.sampling.threaded_solve import EXACT
-from planners.sampling.warm_start import better_region, first_states
+from planners.sampling.warm_start import astar_states, informed_region
 from planners.search.base import Cancel, Clock, OnImproved, SearchResult
 
-# With several goals, BFMT crashes, and PRM's threads wait for each other.
-ONE_GOAL = ("bfmt", "prm", "prmstar")
+# With several goals, BFMT crashes, and the threads of PRM and PRM* deadlock.
+SINGLE_GOAL = ("bfmt", "prm", "prmstar")
 
 
 class SamplingPlanner:
-    """One of OMPL's planners on one costmap.
+    """One of OMPL's planners on a costmap.
 
     Parameters
     ----------
     name : str
-        As in `samplers`: the class's name in small letters.
-    costmap : Costmap, or Voxels on a 3-D map
+        As in `samplers`: the name of the class in lower case.
+    costmap : Costmap or Voxels
 
     Notes
     -----
-    In r2, waypoints are the corners of a line that the disc around the footprint keeps clear. In
-    the other spaces they are poses as dense as the sweep between them was checked: half a cell
-    apart at most. No route is the best one for sure; its `expanded` counts edges that were checked.
+    In flat spaces, waypoints are the corners of a line along which the disc or ball around the
+    footprint is clear. In the others they are poses as dense as the checks of the sweep between
+    them: at most half a cell apart. No route is guaranteed to be optimal. Its `expanded` counts
+    edges that were checked.
 
-    Searches wait for each other, as OMPL's random numbers are global. With ``iterations``, a search
-    repeats exactly, unless the time limit ends it; PRM and PRM* run threads, and never do.
+    One search runs at a time, as OMPL's random numbers are global. With ``iterations``, a search
+    repeats exactly unless the time limit ends it; PRM and PRM* run threads and never repeat.
     """
 
     def __init__(self, name: str, costmap: Costmap | Voxels) -> None:
         self.name, self.costmap = name, costmap
-        self._ways: dict[tuple[StateSpace, float], MotionValidator | MotionValidator3D] = {}
+        self._validators: dict[tuple[StateSpace, float], MotionValidator] = {}
 
     def search(
         self,
@@ -72,14 +75,14 @@ class SamplingPlanner:
         on_improved: OnImproved | None = None,
         cancel: Cancel | None = None,
     ) -> SearchResult | None:
-        """Return a route from start to goal, or None if it is proved that there is none.
+        """Return a route from start to goal, or None if there is provably none.
 
-        None is also what a start or a goal gets where the footprint overlaps blocked cells.
+        None is also returned if the footprint overlaps blocked cells at the start or the goal.
 
         Parameters
         ----------
         start, goal : tuple of float
-            x, y [m, map] and, where the space has it, yaw [rad].
+            x, y (, z) [m, map] and, where the space has one, yaw [rad].
         settings : SamplingSettings
         on_improved, cancel : optional
             As in `planners.plan`. Costs are the objective's; the last is that of the route.
@@ -87,16 +90,16 @@ class SamplingPlanner:
         Raises
         ------
         ProblemError
-            A space or an objective that the planner can't plan with, or a place that lacks a yaw.
+            A space or an objective that the planner does not support, or a place without a yaw.
         SettingsError
-            A parameter that the planner doesn't have.
+            A parameter that the planner does not have.
         UnsolvedError
             The planner ended without reaching the goal.
         TimeLimitError, CancelledError
-            Time ran out, or somebody set `cancel`; with a limit of 0, always.
+            The time was up, always so with a limit of 0, or `cancel` was set.
         """
-        clock = Clock(self.name, settings.time_limit, Ending(cancel))
-        validator = self._ways_for(start, goal, settings)
+        clock = Clock(self.name, settings.time_limit, StopRequest(cancel))
+        validator = self._validator_for(start, goal, settings)
         self._check(validator.space, settings)
         objective = Objective(validator, settings)
         objective.check(self.name)
@@ -109,56 +112,56 @@ class SamplingPlanner:
             return self._report(task, [task.start, task.start], 0)
         if settings.warm_start:
             return self._improve(task)
-        return self._to_result(task, _alone_run(task))
+        return self._to_result(task, _run_exclusively(task))
 
-    def _ways_for(
+    def _validator_for(
         self, start: Pose, goal: Pose, settings: SamplingSettings
-    ) -> MotionValidator | MotionValidator3D:
+    ) -> MotionValidator:
         axes = self.costmap.blocked.ndim
         if settings.space is not None and (settings.space == "r3") != (axes == 3):
             expected = "'r3', on a 3-D map" if axes == 3 else "one with two axes, on a 2-D map"
             raise ProblemError("space", expected, repr(settings.space))
         space = settings.space_for(self.costmap.problem.shape, start, goal, axes=axes)
         key = space, settings.turning_radius
-        if key not in self._ways:
+        if key not in self._validators:
             costmap = self.costmap
-            self._ways[key] = (
+            self._validators[key] = (
                 MotionValidator3D(costmap)
                 if isinstance(costmap, Voxels)
-                else MotionValidator(costmap, *key)
+                else MotionValidator2D(costmap, *key)
             )
-        return self._ways[key]
+        return self._validators[key]
 
     def _check(self, space: StateSpace, settings: SamplingSettings) -> None:
         reason = refusal(self.name, space)
         if reason is not None:
             raise ProblemError("planner", f"one that works in {space!r}", self.name, hint=reason)
         if self.name in THREADED and settings.iterations is not None:
-            reason = "It runs threads, which no count stops: use time_limit."
+            reason = "It runs threads, which a count can't stop: use time_limit."
             raise SettingsError("iterations", f"none for {self.name!r}", "a count", hint=reason)
-        if self.name in ONE_GOAL and settings.takes_other_goals:
-            expected = f"one place, which is all that {self.name!r} plans to"
+        if self.name in SINGLE_GOAL and settings.takes_other_goals:
+            expected = f"a single goal for {self.name!r}, without tolerances"
             raise SettingsError("goals", expected, "more", hint="Take 'rrtconnect' or 'fmt'.")
         if self.name == "bitstar" and settings.keep_graph:
-            reason = "OMPL would never free it: take 'rrtstar'."
+            reason = "OMPL would never free its memory: take 'rrtstar'."
             raise SettingsError("keep_graph", "False for 'bitstar'", "True", hint=reason)
         for name in settings.parameters():
             if not has_parameter(self.name, name):
                 own = [one for one in PARAMETERS if has_parameter(self.name, one)]
                 expected = f"a parameter that {self.name!r} has: {', '.join(own)}"
-                raise SettingsError(name, expected, "another's")
+                raise SettingsError(name, expected, "one of another planner")
 
     def _task(
         self,
-        validator: MotionValidator | MotionValidator3D,
-        asked: tuple[Pose, Pose],
+        validator: MotionValidator,
+        query: tuple[Pose, Pose],
         settings: SamplingSettings,
         reporter: ImprovementReporter,
         *,
         objective: Objective,
     ) -> Task | None:
-        """Return what OMPL is to do, or None if there is no route for sure."""
-        start, goal = asked
+        """Return the input of OMPL's search, or None if there is provably no route."""
+        start, goal = query
         begin = self._state(validator, "start", start)
         if not settings.takes_other_goals:
             self._state(validator, "goal", goal)
@@ -169,9 +172,9 @@ class SamplingPlanner:
             goal,
             settings.seed,
             within=region,
-            look=partial(reporter.clock.check, 0),
+            poll=partial(reporter.clock.check, 0),
         )
-        axes = len(begin) if validator.space in FLAT else 2
+        axes = validator.axes
         place = start[:axes] if validator.space in FLAT else start
         if settings.takes_other_goals and settings.will_do(place, goal, axes=axes):
             goals = [begin]
@@ -179,8 +182,8 @@ class SamplingPlanner:
             if not goal_states(validator, settings, goal, settings.seed):
                 check_on_map(replace(self.costmap.problem, start=start, goal=goal))
                 check_space(self.costmap, "goal", goal, headings=validator.space not in FLAT)
-            if come_near(validator, settings, goal, region):
-                reason = "nowhere near enough to a goal was found that can be reached"
+            if may_contain_goal(region, validator, settings, goal):
+                reason = "no reachable place within the tolerances of a goal was found"
                 raise UnsolvedError(self.name, reason=reason, expanded=0)
         if not (goals and validator.is_clear(*begin, *begin)):
             return None
@@ -188,7 +191,7 @@ class SamplingPlanner:
             name=self.name,
             validator=validator,
             region=region,
-            room=box_of(region, self.costmap.window.resolution),
+            bounds=box_of(region, self.costmap.window.resolution),
             start=begin,
             goals=goals,
             objective=objective,
@@ -196,76 +199,76 @@ class SamplingPlanner:
             clock=reporter.clock,
             reporter=reporter,
             first=[],
-            asked=asked,
+            query=query,
         )
 
-    def _state(
-        self, validator: MotionValidator | MotionValidator3D, place: Place, pose: Pose
-    ) -> Pose:
+    def _state(self, validator: MotionValidator, place: Place, pose: Pose) -> Pose:
         if validator.space not in FLAT and len(pose) != 3:
             expected = f"x, y [m] and yaw [rad] for {self.name} in {validator.space}"
             raise ProblemError(place, expected, str(pose))
         return validator.state_of(pose)
 
     def _improve(self, task: Task) -> SearchResult:
-        """Return A*'s route, or a better one."""
-        first = first_states(task.validator, *task.asked, task.settings, task.clock)
+        """Return A*'s route, or a cheaper one."""
+        first = astar_states(task.validator, *task.query, task.settings, task.clock)
         if not first:
-            return self._to_result(task, _alone_run(task))
+            return self._to_result(task, _run_exclusively(task))
         if task.settings.simplify:
             first = simplify_path(first, task.validator, task.objective, task.clock)
         cost = task.objective.cost(first)
         task.reporter.report(cost, task.validator.poses(first))
-        if task.reporter.enough:
+        if task.reporter.should_stop:
             return self._report(task, first, 0)
         size = self.costmap.window.resolution
-        longest = task.objective.longest(cost)
-        region = better_region(task.region, size, task.start, task.goals, longest, clock=task.clock)
-        room = box_of(region, size)
-        with ExitStack() as mine:
+        max_length = task.objective.max_length(cost)
+        region = informed_region(
+            task.region, size, task.start, task.goals, max_length, clock=task.clock
+        )
+        bounds = box_of(region, size)
+        with ExitStack() as stack:
             try:
-                mine.enter_context(turn(task.clock))
+                stack.enter_context(hold_ompl(task.clock))
             except (CancelledError, TimeLimitError):
                 return self._report(task, first, 0)
-            found = OmplSearch(replace(task, region=region, room=room, first=first)).outcome()
-        better = found.status == EXACT and task.objective.cost(found.states) < cost
-        states = found.states if better else first
-        return self._report(task, states, found.checked)._replace(graph=found.graph)
+            result = OmplSearch(replace(task, region=region, bounds=bounds, first=first)).run()
+        is_cheaper = result.status == EXACT and task.objective.cost(result.states) < cost
+        states = result.states if is_cheaper else first
+        return self._report(task, states, result.checked)._replace(graph=result.graph)
 
-    def _to_result(self, task: Task, outcome: TaskResult) -> SearchResult:
-        if outcome.status != EXACT:
-            raise self._explain_failure(outcome, task.settings, task.clock)
-        found = self._report(task, outcome.states, outcome.checked)
-        return found._replace(graph=outcome.graph)
+    def _to_result(self, task: Task, result: TaskResult) -> SearchResult:
+        if result.status != EXACT:
+            raise self._explain_failure(result, task.settings, task.clock)
+        route = self._report(task, result.states, result.checked)
+        return route._replace(graph=result.graph)
 
     def _report(self, task: Task, states: Sequence[Pose], checked: int) -> SearchResult:
         cost = task.objective.cost(states)
-        found = to_search_result(
-            task.validator, states, asked=task.asked, cost=cost, checked=checked
+        route = to_search_result(
+            task.validator, states, query=task.query, cost=cost, checked=checked
         )
-        task.reporter.ends(cost, found.waypoints)
-        return found
+        task.reporter.report_final(cost, route.waypoints)
+        return route
 
     def _explain_failure(
-        self, found: TaskResult, settings: SamplingSettings, clock: Clock
+        self, result: TaskResult, settings: SamplingSettings, clock: Clock
     ) -> NoRouteError:
         if clock.is_cancelled:
-            return CancelledError(self.name, seconds=clock.seconds, expanded=found.checked)
+            return CancelledError(self.name, seconds=clock.seconds, expanded=result.checked)
         if clock.is_up and clock.time_limit is not None:
             return TimeLimitError(
                 self.name,
                 time_limit=clock.time_limit,
-                expanded=found.checked,
+                expanded=result.checked,
                 unit="edges checked",
-                left=found.left,
+                left=result.left,
             )
-        reason = REASONS.get(found.status, found.status)
-        if settings.iterations is not None and found.status in ("TIMEOUT", "APPROXIMATE_SOLUTION"):
+        reason = REASONS.get(result.status, result.status)
+        if settings.iterations is not None and result.status in ("TIMEOUT", "APPROXIMATE_SOLUTION"):
             reason = f"the goal was not reached in iterations = {settings.iterations}"
-        return UnsolvedError(self.name, reason=reason, expanded=found.checked, left=found.left)
+        return UnsolvedError(self.name, reason=reason, expanded=result.checked, left=result.left)
 
 
-def _alone_run(task: Task) -> TaskResult:
-    """Run a search when no other one runs."""
-    with turn(task.clock):
-        return OmplSearch(task).outcome()
+def _run_exclusively(task: Task) -> TaskResult:
+    """Run a search while no other one runs."""
+    with hold_ompl(task.clock):
+        return OmplSearch(task).run()

@@ -1,4 +1,4 @@
-"""Files of roadmaps: arrays and JSON, and a digest of the map that they were grown over."""
+"""Roadmap files: arrays, JSON, and a digest of the map that the roadmap was grown on."""
 
 from __future__ import annotations
 
@@ -20,22 +20,26 @@ from planners.sampling.settings import SamplingSettings, StateSpace
 from planners.search.graph import Graph
 
 FORMAT, VERSION = "groundmap roadmap", 1
-SPACES: tuple[StateSpace, ...] = ("r2", "se2", "reeds_shepp")  # whose ways lead back, too
+SPACES: tuple[StateSpace, ...] = (
+    "r2",
+    "se2",
+    "reeds_shepp",
+)  # spaces whose edges can be driven both ways
 
 
 def write_roadmap(
     path: str | PathLike[str], graph: Graph, costmap: Costmap, settings: Mapping[str, Any]
 ) -> None:
-    """Write a roadmap, all or nothing.
+    """Write a roadmap file atomically.
 
     Parameters
     ----------
     path : path-like
     graph : Graph
     costmap : Costmap
-        That it was grown over.
+        Of the map that the roadmap was grown on.
     settings : mapping
-        Those that were given, its space among them.
+        Settings that were given, and the space.
     """
     header = {
         "format": FORMAT,
@@ -51,18 +55,18 @@ def write_roadmap(
 def read_roadmap(
     path: str | PathLike[str], problem: PlanningProblem
 ) -> tuple[Graph, Costmap, SamplingSettings]:
-    """Return a roadmap, the costmap that it was grown over, and its settings.
+    """Return a roadmap, the costmap that it was grown on, and its settings.
 
     Parameters
     ----------
     path : path-like
     problem : PlanningProblem
-        Start and goal don't matter.
+        Its start and goal are ignored.
 
     Raises
     ------
     FileFormatError
-        No roadmap, or one of another map or footprint.
+        Not a roadmap file, or one of another map or footprint.
     """
     header, arrays = read_archive(path, FORMAT, VERSION)
     try:
@@ -71,23 +75,24 @@ def read_roadmap(
         space, ground = header["settings"]["space"], header["ground"]
         place = tuple(map(float, header["cleared_at"]))
         cleared = place if problem.cleared_at is None else problem.cleared_at
-        asked = replace(problem, start=place, goal=place, cleared_at=cleared)
+        problem = replace(problem, start=place, goal=place, cleared_at=cleared)
     except (KeyError, TypeError, ValueError) as error:
-        raise FileFormatError(path, "a whole roadmap", "one that lacks something") from error
+        expected = "a complete roadmap"
+        raise FileFormatError(path, expected, "one with missing or invalid parts") from error
     if settings.space not in SPACES:
         raise FileFormatError(path, f"a roadmap in one of {', '.join(SPACES)}", repr(space))
     if not _fits(graph, width=2 if space == "r2" else 3):
-        raise FileFormatError(path, "a whole roadmap", "arrays that don't fit each other")
-    costmap = _costmap_of(asked)
+        raise FileFormatError(path, "a complete roadmap", "arrays that are not consistent")
+    costmap = _costmap_of(problem)
     if costmap is None or _digest(costmap) != ground:
         raise FileFormatError(
             path,
             "a roadmap of this map and footprint",
-            "one that was grown over other free cells or for another footprint",
-            hint="Grow another one.",
+            "one that was grown on other free cells or for another footprint",
+            hint="Grow another roadmap.",
         )
     if not _is_on_map(graph, costmap):
-        raise FileFormatError(path, "a whole roadmap", "places that are not on the map")
+        raise FileFormatError(path, "a complete roadmap", "places that are not on the map")
     return graph, costmap, settings
 
 
@@ -101,7 +106,7 @@ def _is_on_map(graph: Graph, costmap: Costmap) -> bool:
 
 
 def _costmap_of(problem: PlanningProblem) -> Costmap | None:
-    """Return the costmap of a problem, or None if the map has no such place."""
+    """Return the costmap of a problem, or None if its start is outside the map."""
     try:
         check_on_map(problem)
     except OutsideMapError:
@@ -110,7 +115,7 @@ def _costmap_of(problem: PlanningProblem) -> Costmap | None:
 
 
 def _fits(graph: Graph, *, width: int) -> bool:
-    """Whether the arrays of a file are those of a graph."""
+    """Whether the arrays of a file form a graph."""
     vertices, edges, weights = graph.vertices, graph.edges, graph.weights
     return (
         vertices.shape == (len(vertices), width)
@@ -125,9 +130,9 @@ def _fits(graph: Graph, *, width: int) -> bool:
 
 
 def _digest(costmap: Costmap) -> str:
-    """Return a digest of what a roadmap depends on: the free cells, and the footprint.
+    """Return a digest of the free cells and the footprint, which a roadmap depends on.
 
-    What is blocked anyway does not matter, so it is the same however wide the window is.
+    Blocked cells are not included, so the digest does not depend on the extent of the window.
     """
     grid, shape = costmap.problem.grid, costmap.problem.shape
     cells = np.argwhere(~costmap.blocked) + costmap.lower_cell

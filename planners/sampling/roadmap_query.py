@@ -1,4 +1,4 @@
-"""Paths through a roadmap: how starts and goals are joined to it, and what can be left out."""
+"""Queries of a roadmap: connection of start and goal, the cheapest path, and its shortening."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from scipy.spatial import cKDTree
 from groundmap.arrays import Floats, Ints
 from planners.problem.problem import Pose
 from planners.sampling.kernels.roadmap import cheapest_path
-from planners.sampling.motion_validator import MotionValidator
+from planners.sampling.motion_validator2d import MotionValidator2D
 from planners.sampling.objectives import Objective
 from planners.sampling.settings import FLAT, TURNING, SamplingSettings
 from planners.search.graph import Graph
 
-NEIGHBOURS = 10  # vertices that a start or a goal is joined to
-NEAREST = (40, 1000)  # vertices that are tried for that, the second if none of the first will do
-ROUNDS = 5  # of leaving out vertices of a path
+NEIGHBOURS = 10  # vertices that a start or a goal is connected to
+NEAREST = (40, 1000)  # nearest vertices tried for that; the second if none of the first is clear
+ROUNDS = 5  # of shortening a path
 
 
-class Checked:
-    """A check of edges that counts them."""
+class CountingCheck:
+    """A check of edges that counts its calls."""
 
     def __init__(self, is_clear: Callable[..., bool]) -> None:
         self.is_clear, self.count = is_clear, 0
@@ -36,29 +36,29 @@ class Checked:
 
 
 class Connections(NamedTuple):
-    """Vertices that a place is joined to, and what it costs to get there."""
+    """Vertices that a start or goal is connected to, and the costs of the edges to them."""
 
     vertices: Ints
     costs: Floats
 
 
 class RoadmapQuery:
-    """A roadmap that is ready for queries.
+    """A roadmap prepared for queries.
 
     Parameters
     ----------
     graph : Graph
         Its edges can be driven both ways.
-    validator : MotionValidator
+    validator : MotionValidator2D
     objective : Objective
-        What is to be small.
+        Minimised.
     settings : SamplingSettings
     """
 
     def __init__(
         self,
         graph: Graph,
-        validator: MotionValidator,
+        validator: MotionValidator2D,
         objective: Objective,
         settings: SamplingSettings,
     ) -> None:
@@ -68,36 +68,45 @@ class RoadmapQuery:
         self.states: list[Pose] = [tuple(state) for state in states.tolist()]
         self.places = np.ascontiguousarray(states[:, :2])
         self.rate = objective.least(*(0.0,) * states.shape[1], 1.0, *(0.0,) * (states.shape[1] - 1))
-        self._join(graph.edges, self._costs(graph, settings))
-        # A turn is as far as its arc: on a circle, every yaw has its neighbours on both sides.
+        self._build_adjacency(graph.edges, self._costs(graph, settings))
+        # Yaws are embedded as points on a circle of this radius, which has no jump at ±π.
         self.arm = 0.0
         if validator.space not in FLAT:
             turning = validator.space in TURNING
             self.arm = settings.turning_radius if turning else settings.yaw_weight
-        self.tree = cKDTree(self._spread(states)) if len(states) else None
+        self.tree = cKDTree(self._embed(states)) if len(states) else None
 
-    def path(self, start: Pose, goal: Pose, is_clear: Checked) -> list[Pose] | None:
-        """Return the states of the cheapest path that is found, or None.
+    def path(self, start: Pose, goal: Pose, is_clear: CountingCheck) -> list[Pose] | None:
+        """Return the states of the cheapest path, all of its edges checked; None if there is none.
 
-        Every edge of it was checked.
+        Parameters
+        ----------
+        start, goal : state [m, corner; rad]
+        is_clear : CountingCheck
         """
         direct = [start, goal] if is_clear(start, goal) else None
         if direct is not None and self.objective.is_native:
             return direct
-        sources, targets = (self._links(end, is_clear) for end in (start, goal))
+        sources, targets = (self._connect(end, is_clear) for end in (start, goal))
         while True:
             vertices = self._cheapest(sources, targets, goal)
             if len(vertices) == 0:
                 return direct
             path = [start, *(self.states[vertex] for vertex in vertices.tolist()), goal]
-            if self._holds(vertices, is_clear):
+            if self._are_clear(vertices, is_clear):
                 break
         if direct is not None and self.objective.cost(direct) <= self.objective.cost(path):
             return direct
         return path
 
-    def shorten(self, path: list[Pose], is_clear: Checked) -> list[Pose]:
-        """Return a path with states left out where that makes it no dearer."""
+    def shorten(self, path: list[Pose], is_clear: CountingCheck) -> list[Pose]:
+        """Return a path without the states whose removal does not increase its cost.
+
+        Parameters
+        ----------
+        path : list of states [m, corner; rad]
+        is_clear : CountingCheck
+        """
         for _ in range(ROUNDS):
             shorter = self._skip_states(path, is_clear)
             if len(shorter) == len(path):
@@ -106,7 +115,7 @@ class RoadmapQuery:
         return path
 
     def _costs(self, graph: Graph, settings: SamplingSettings) -> Floats:
-        """Return what the edges cost, shape (m,)."""
+        """Return the costs of the edges, shape (m,)."""
         if not self.objective.is_native:
             edges = graph.edges.tolist()
             costs = [self.objective.edge(*self.states[a], *self.states[b]) for a, b in edges]
@@ -115,11 +124,11 @@ class RoadmapQuery:
             return graph.weights
         tails, heads = graph.vertices[graph.edges, 2].T
         turns = np.abs(np.remainder(heads - tails + math.pi, 2.0 * math.pi) - math.pi)
-        weighed: Floats = graph.weights + settings.yaw_weight * turns
-        return weighed
+        weighted: Floats = graph.weights + settings.yaw_weight * turns
+        return weighted
 
-    def _join(self, edges: Ints, cost: Floats) -> None:
-        """Sort the edges, and their reverses, by where they begin."""
+    def _build_adjacency(self, edges: Ints, cost: Floats) -> None:
+        """Sort the edges and their reverses by their tails."""
         tails, heads = np.concatenate([edges, edges[:, ::-1]]).T
         order = np.argsort(tails, kind="stable")
         self.heads = np.ascontiguousarray(heads[order])
@@ -127,21 +136,22 @@ class RoadmapQuery:
         starts = np.searchsorted(tails[order], np.arange(len(self.states) + 1))
         self.first = starts.astype(np.int64)
 
-    def _spread(self, states: Floats) -> Floats:
-        """Return states as points whose distance says which ones may be near."""
+    def _embed(self, states: Floats) -> Floats:
+        """Return states as points in a Euclidean space, for nearest neighbours."""
         if self.arm == 0.0:
             return states
         yaws = states[:, 2]
         return np.column_stack([states[:, :2], self.arm * np.cos(yaws), self.arm * np.sin(yaws)])
 
-    def _links(self, end: Pose, is_clear: Checked) -> Connections:
+    def _connect(self, end: Pose, is_clear: CountingCheck) -> Connections:
         """Return near vertices with a clear edge to a start or goal, at most `NEIGHBOURS`."""
         vertices: list[int] = []
         costs: list[float] = []
         if self.tree is not None:
-            at = self._spread(np.array([end]))[0]
-            for most in NEAREST:
-                near = np.atleast_1d(self.tree.query(at, min(most, len(self.states)))[1]).tolist()
+            point = self._embed(np.array([end]))[0]
+            for number in NEAREST:
+                nearest = self.tree.query(point, min(number, len(self.states)))[1]
+                near = np.atleast_1d(nearest).tolist()
                 ranked = sorted((self.objective.edge(*end, *self.states[v]), v) for v in near)
                 for cost, vertex in ranked:
                     if is_clear(end, self.states[vertex]):
@@ -154,6 +164,7 @@ class RoadmapQuery:
         return Connections(np.array(vertices, dtype=np.int64), np.array(costs, dtype=np.float64))
 
     def _cheapest(self, sources: Connections, targets: Connections, goal: Pose) -> Ints:
+        """Return the vertices of the cheapest path; empty if there is none."""
         to_goal = np.full(len(self.states), math.inf)
         to_goal[targets.vertices] = targets.costs
         path: Ints = cheapest_path(
@@ -168,23 +179,24 @@ class RoadmapQuery:
         )
         return path
 
-    def _holds(self, vertices: Ints, is_clear: Checked) -> bool:
-        """Whether all edges along a path are clear; those that aren't are never taken again.
+    def _are_clear(self, vertices: Ints, is_clear: CountingCheck) -> bool:
+        """Whether all edges along a path are clear; the others get an infinite cost.
 
-        They were when the roadmap was grown. But over a file's the map may have grown: states
-        count from another corner then, and rounding may choose another of two equal curves.
+        They were clear when the roadmap was grown. But the map may have been extended since a
+        roadmap was saved: states then refer to another corner, and rounding may select another of
+        two equally short curves.
         """
-        holds = True
+        path_is_clear = True
         for a, b in pairwise(vertices.tolist()):
             if not is_clear(self.states[a], self.states[b]):
-                holds = False
+                path_is_clear = False
                 for tail, head in ((a, b), (b, a)):
                     part = slice(self.first[tail], self.first[tail + 1])
                     self.costs[part][self.heads[part] == head] = math.inf
-        return holds
+        return path_is_clear
 
-    def _skip_states(self, path: list[Pose], is_clear: Checked) -> list[Pose]:
-        """Return the cheapest path that leaves out 0, 1, 3, 7, ... states at a time."""
+    def _skip_states(self, path: list[Pose], is_clear: CountingCheck) -> list[Pose]:
+        """Return the cheapest path that skips 0, 1, 3, 7, ... states at a time."""
         best, came = [0.0], [0]
         for j in range(1, len(path)):
             best.append(math.inf)

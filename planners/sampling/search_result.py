@@ -1,4 +1,4 @@
-"""From the states of a path to a route on the map."""
+"""Conversion of a path of states to a route on the map."""
 
 from __future__ import annotations
 
@@ -9,33 +9,31 @@ import numpy as np
 
 from planners.problem.problem import Pose
 from planners.sampling.motion_validator import MotionValidator
-from planners.sampling.motion_validator3d import MotionValidator3D
 from planners.sampling.settings import FLAT
 from planners.search.base import SearchResult
 
 
 def to_search_result(
-    validator: MotionValidator | MotionValidator3D,
+    validator: MotionValidator,
     states: Sequence[Pose],
     *,
-    asked: tuple[Pose, Pose],
+    query: tuple[Pose, Pose],
     cost: float,
     checked: int,
 ) -> SearchResult:
-    """Return a path as a route on the map, with start and goal as they were given.
+    """Return a path as a route on the map, with start and goal exactly as given.
 
     Parameters
     ----------
-    validator : MotionValidator or MotionValidator3D
+    validator : MotionValidator
     states : sequence of states
-    asked : tuple of two poses [map]
-        Start and goal; the path may end at another goal that will do.
+    query : tuple of two poses [map]
+        Start and goal; the path may end at another accepted goal.
     cost : float
     checked : int
-        Edges.
+        Number of edges checked.
     """
-    start, goal = asked
-    axes = 3 if validator.space == "r3" else 2
+    (start, goal), axes = query, validator.axes
     poses = validator.poses(states)
     if len(poses) == 1:
         poses = np.concatenate([poses, poses])
@@ -44,7 +42,7 @@ def to_search_result(
     if len(goal) >= len(states[-1]) and states[-1] == validator.state_of(goal):
         poses[-1, :axes] = goal[:axes]
     else:
-        if states[-1] == states[0]:  # it is there already
+        if states[-1] == states[0]:  # the start is an accepted goal
             poses[-1, :axes] = start[:axes]
         end = tuple(poses[-1].tolist())
     waypoints = np.ascontiguousarray(poses[:, :axes])

@@ -1,4 +1,4 @@
-"""What one of OMPL's planners is to do, and what it brings back."""
+"""Input and result of one search with OMPL."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from groundmap.arrays import Bools
 from planners.problem.problem import Pose
 from planners.sampling.improvement_reporter import ImprovementReporter
 from planners.sampling.motion_validator import Bounds, MotionValidator
-from planners.sampling.motion_validator3d import MotionValidator3D
 from planners.sampling.objectives import Objective
 from planners.sampling.settings import SamplingSettings
 from planners.search.base import Clock
@@ -18,27 +17,27 @@ from planners.search.graph import Graph
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What one of OMPL's planners is to do."""
+    """Input of one search."""
 
     name: str  #: of the planner
-    validator: MotionValidator | MotionValidator3D
-    region: Bools  #: cells to draw samples from
-    room: Bounds  #: box that OMPL samples
+    validator: MotionValidator
+    region: Bools  #: cells to sample
+    bounds: Bounds  #: box that OMPL samples
     start: Pose
-    goals: list[Pose]  #: clear states, each of which will do
+    goals: list[Pose]  #: clear states, any of which may end the path
     objective: Objective
     settings: SamplingSettings
     clock: Clock
     reporter: ImprovementReporter
-    first: list[Pose]  #: states to draw before any others
-    asked: tuple[Pose, Pose]  #: start and goal as they were given [m, map]
+    first: list[Pose]  #: states to sample before any others
+    query: tuple[Pose, Pose]  #: start and goal as given [m, map]
 
 
 class TaskResult(NamedTuple):
-    """What OMPL brought back."""
+    """Result of one search."""
 
-    status: str
-    states: list[Pose]  #: the path, if there is one
-    left: float | None  #: from its end to the goal, in the space's own distance [m]
-    checked: int  #: edges
-    graph: Graph | None = None  #: the tree or roadmap, if it was to be kept
+    status: str  #: OMPL's, or another reason for a failure
+    states: list[Pose]  #: the path; empty without a solution
+    left: float | None  #: from its end to the goal, in the space's own metric [m]
+    checked: int  #: number of edges checked
+    graph: Graph | None = None  #: the planner's tree or roadmap, if kept

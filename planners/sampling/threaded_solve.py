@@ -1,8 +1,8 @@
-"""Planners that run threads of their own: PRM and PRM*.
+"""Runs planners that start threads of their own: PRM and PRM*.
 
-No exception may pass through these threads, and they must not be asked whether to stop while they
-wait for the interpreter. So OMPL's own clock stops them, time and again, in a thread that signals
-don't reach.
+No exception may pass through these threads, and their termination condition must not call Python,
+which would wait for the interpreter lock. OMPL's own clock therefore stops them in short slices, in
+a thread that no signal interrupts.
 """
 
 from __future__ import annotations
@@ -15,25 +15,25 @@ from typing import Any
 from planners.sampling.task import Task
 
 EXACT = "EXACT_SOLUTION"
-SLICE = 0.05  # [s] they are stopped that often, to look whether to
+SLICE = 0.05  # [s] of search between two checks whether to stop
 
 
 def solve_in_slices(planner: Any, definition: Any, task: Task, errors: list[BaseException]) -> str:
-    """Run a planner until it ends or is to; return the name of its status.
+    """Run a planner until it ends or has to stop; return the name of its status.
 
     Parameters
     ----------
-    planner, definition
-        OMPL's planner, and its problem.
+    planner, definition : object
+        OMPL's planner and problem definition.
     task : Task
     errors : list of exceptions
-        Of what the planner calls back, by `collect_errors`: the first ends the search, and is
-        raised.
+        Errors of the planner's callbacks, as `collect_errors` adds them: the first one ends the
+        search and is raised.
     """
-    stopped, busy, ending = threading.Event(), threading.Lock(), Future[str]()
+    stopped, busy, result = threading.Event(), threading.Lock(), Future[str]()
     costs: list[float] = []
 
-    def solved() -> str:
+    def solve() -> str:
         status = ""
         while not (stopped.is_set() or errors):
             status = str(planner.solve(SLICE).getStatus().name)
@@ -41,30 +41,31 @@ def solve_in_slices(planner: Any, definition: Any, task: Task, errors: list[Base
                 costs.append(task.objective.scale * float(definition.getSolutionPath().length()))
             if (costs and task.name == "prm") or task.clock.is_up:
                 break
-        return EXACT if costs else status  # the last slice may have been too short to look
+        return EXACT if costs else status  # the last slice may end before it returns the solution
 
     def work() -> None:
         with busy:
             try:
-                ending.set_result(solved())
-            except BaseException as error:  # it is raised where it is waited for
-                ending.set_exception(error)
+                result.set_result(solve())
+            except BaseException as error:  # the waiting thread raises it
+                result.set_exception(error)
 
-    def tell() -> None:
+    def report() -> None:
         for cost in costs:
             task.reporter.report(cost)
 
     try:
         threading.Thread(target=work).start()
-        while not wait([ending], timeout=SLICE).done:  # a wait without end hears no signal
-            tell()
-            if task.reporter.enough or task.reporter.has_had(task.settings.improve_for):
+        while not wait([result], timeout=SLICE).done:  # a wait without timeout blocks signals
+            report()
+            improve_for = task.settings.improve_for
+            if task.reporter.should_stop or task.reporter.has_improved_for(improve_for):
                 stopped.set()
-        tell()
-        status = ending.result()
+        report()
+        status = result.result()
     finally:
-        # A pool forgets a thread at whose start it is interrupted. This one has ended when `busy`
-        # is free, or has not begun to search and won't.
+        # A thread pool may lose a thread if an interrupt arrives while it starts. Once `busy` is
+        # free, this thread has either ended, or sees `stopped` before it searches.
         stopped.set()
         with busy:
             pass
@@ -74,13 +75,20 @@ def solve_in_slices(planner: Any, definition: Any, task: Task, errors: list[Base
 
 
 def collect_errors(check: Callable[..., bool], errors: list[BaseException]) -> Callable[..., bool]:
-    """Return a check that says no instead of raising, and keeps what it would have raised."""
+    """Return a check that returns False instead of raising an error.
 
-    def guard(*args: Any) -> bool:
+    Parameters
+    ----------
+    check : callable
+    errors : list of exceptions
+        Receives the errors.
+    """
+
+    def guarded(*args: Any) -> bool:
         try:
             return check(*args)
         except BaseException as error:
             errors.append(error)
             return False
 
-    return guard
+    return guarded

@@ -16,7 +16,7 @@ from planners.bench.motions import COMPILED, LAMBDA, REACH, compare_motions, lam
 from planners.costmap.costmap import Costmap
 from planners.errors import ProblemError
 from planners.problem.problem import PlanningProblem
-from planners.sampling.motion_validator import MotionValidator
+from planners.sampling.motion_validator2d import MotionValidator2D
 from planners.sampling.ompl_module import samplers
 
 needs_ompl = pytest.mark.skipif(not samplers(), reason="ompl is not installed")
@@ -75,7 +75,7 @@ def test_the_lambda_is_right_about_states(footprint: Any, space: Any) -> None:
     problem = PlanningProblem(
         walls(), start=QUERIES[0][0], goal=QUERIES[0][1], footprint=footprint, clear_start=False
     )
-    validator = MotionValidator(Costmap.of(problem), space, 1.0)
+    validator = MotionValidator2D(Costmap.of(problem), space, 1.0)
     is_valid, rng = lambda_of(validator), np.random.default_rng(0)
     high = np.array(validator.costmap.blocked.shape[::-1]) * SIZE
     results = []

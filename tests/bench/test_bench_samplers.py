@@ -36,6 +36,7 @@ from planners.bench.worker_pool import worker_pool
 from planners.costmap.costmap import Costmap
 from planners.costmap.voxel_map import Voxels
 from planners.sampling.motion_validator import MotionValidator
+from planners.sampling.motion_validator2d import MotionValidator2D
 from planners.sampling.motion_validator3d import MotionValidator3D
 from planners.sampling.ompl_module import samplers
 from planners.sampling.settings import StateSpace
@@ -79,17 +80,17 @@ def test_start_and_goal_are_clear_in_every_space_and_no_straight_line_joins_them
     name: str, made: dict[str, Cases]
 ) -> None:
     for space, (problem, settings) in made[name].items():
-        validator: MotionValidator | MotionValidator3D
+        validator: MotionValidator
         if space == "r3":
             validator = MotionValidator3D(Voxels.of(problem))
         else:
-            validator = MotionValidator(
+            validator = MotionValidator2D(
                 Costmap.of(problem), space, settings.get("turning_radius", 1.0)
             )
         start, goal = (validator.state_of(tuple(pose)) for pose in (problem.start, problem.goal))
         assert validator.is_clear(*start, *start)
         assert validator.is_clear(*goal, *goal)
-        assert validator.room(start, goal) is not None
+        assert validator.bounds(start, goal) is not None
         assert not validator.is_clear(*start, *goal)
 
 

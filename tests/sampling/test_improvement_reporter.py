@@ -1,4 +1,4 @@
-"""Sampling planners at work: what they tell, how they are stopped, what they begin with."""
+"""Progress of sampling planners: reported improvements, cancellation and warm starts."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ import pytest
 from oracles_planning import BLOCKED, FREE, free_field, grid_of, rooms
 from planners import CancelledError, Improvement, PlanningProblem, ProblemError, Route, plan
 from planners.costmap.costmap import Costmap
-from planners.sampling.motion_validator import MotionValidator
-from planners.sampling.ompl_lock import turn
+from planners.sampling.motion_validator2d import MotionValidator2D
+from planners.sampling.ompl_lock import hold_ompl
 from planners.sampling.ompl_module import samplers
 from planners.sampling.ompl_search import THREADED
 from planners.sampling.settings import refusal
 from planners.sampling.state_sampler import StateSampler
-from planners.sampling.warm_start import better_region
+from planners.sampling.warm_start import informed_region
 from planners.search.base import Clock
 
 needs_ompl = pytest.mark.skipif(not samplers(), reason="ompl is not installed")
 pytestmark = needs_ompl
 R2 = sorted(name for name in samplers() if refusal(name, "r2") is None)
-BETTERING = ["bitstar", "informedrrtstar", "prmstar", "rrtstar", "sorrtstar"]
+ANYTIME = ["bitstar", "informedrrtstar", "prmstar", "rrtstar", "sorrtstar"]
 CAR = [(-0.5, -0.45), (1.0, -0.45), (1.0, 0.45), (-0.5, 0.45)]
 
 
@@ -37,7 +37,7 @@ def problem(**values: Any) -> PlanningProblem:
 
 
 def needle() -> PlanningProblem:
-    """Return a problem whose only way nobody finds by chance: the door is as wide as the disc."""
+    """Return a problem that random samples do not solve: its door is as wide as the disc."""
     z = free_field(48, 48)
     z[20:28] = BLOCKED
     z[20:28, 22:25] = FREE
@@ -45,7 +45,7 @@ def needle() -> PlanningProblem:
     return PlanningProblem(grid_of(z, resolution=0.25), **ends, clear_start=False)
 
 
-def told(name: str, **settings: Any) -> tuple[Route, list[Improvement]]:
+def plan_and_record(name: str, **settings: Any) -> tuple[Route, list[Improvement]]:
     improvements: list[Improvement] = []
     limits: dict[str, Any] = {"improve_for": 0.3} if name in THREADED else {"iterations": 3000}
     route = plan(problem(), name, on_improved=improvements.append, **(limits | settings))
@@ -53,8 +53,8 @@ def told(name: str, **settings: Any) -> tuple[Route, list[Improvement]]:
 
 
 @pytest.mark.parametrize("name", R2)
-def test_every_better_route_is_told_and_the_last_is_the_route(name: str) -> None:
-    route, improvements = told(name, seed=1)
+def test_improvements_are_reported_and_the_last_is_the_route(name: str) -> None:
+    route, improvements = plan_and_record(name, seed=1)
     costs = [better.cost for better in improvements]
     seconds = [better.seconds for better in improvements]
     assert costs == sorted(costs, reverse=True)
@@ -64,15 +64,15 @@ def test_every_better_route_is_told_and_the_last_is_the_route(name: str) -> None
     assert all(better.bound == math.inf for better in improvements)
 
 
-@pytest.mark.parametrize("name", sorted(set(BETTERING) - set(THREADED)))
-def test_planners_that_better_their_route_do_so(name: str) -> None:
-    _, improvements = told(name, simplify=False)
+@pytest.mark.parametrize("name", sorted(set(ANYTIME) - set(THREADED)))
+def test_anytime_planners_improve_their_route(name: str) -> None:
+    _, improvements = plan_and_record(name, simplify=False)
     assert len(improvements) > 2
     assert improvements[-1].cost < improvements[0].cost
 
 
-class Looks:
-    """Counts how often a search asks whether it is cancelled, which it never is."""
+class CancelPolls:
+    """Counts how often a search polls for cancellation; it is never cancelled."""
 
     count = 0
 
@@ -81,22 +81,22 @@ class Looks:
         return False
 
 
-@pytest.mark.parametrize("name", BETTERING)
-def test_who_has_heard_enough_ends_the_search(name: str) -> None:
-    looks = Looks()
+@pytest.mark.parametrize("name", ANYTIME)
+def test_a_callback_that_returns_true_ends_the_search(name: str) -> None:
+    polls = CancelPolls()
 
-    def enough(better: Improvement) -> bool:
-        looks.count = 0
+    def stop(better: Improvement) -> bool:
+        polls.count = 0
         return True
 
     asked: dict[str, Any] = {"improve_for": 60, "time_limit": None, "seed": 2}
-    route = plan(problem(), name, on_improved=enough, cancel=looks, **asked)
+    route = plan(problem(), name, on_improved=stop, cancel=polls, **asked)
     assert route.audit == "clean"
-    assert looks.count < 1000  # in 60 s there are many thousands
+    assert polls.count < 1000  # in 60 s there are many thousands
 
 
 @pytest.mark.parametrize("name", ["rrtstar", "bitstar"])
-def test_an_error_of_who_is_told_comes_through(name: str) -> None:
+def test_an_error_of_the_callback_is_raised(name: str) -> None:
     def fail(better: Improvement) -> None:
         raise ValueError(f"cost {better.cost > 0}")
 
@@ -115,8 +115,8 @@ def test_a_search_is_cancelled_from_another_thread(name: str) -> None:
     timer.join()
 
 
-@pytest.mark.parametrize("name", BETTERING)
-def test_a_cancelled_search_hands_out_what_it_has(name: str) -> None:
+@pytest.mark.parametrize("name", ANYTIME)
+def test_a_cancelled_search_returns_its_best_route(name: str) -> None:
     cancel = threading.Event()
 
     def stop_soon(better: Improvement) -> None:
@@ -126,7 +126,7 @@ def test_a_cancelled_search_hands_out_what_it_has(name: str) -> None:
     assert route.audit == "clean"
 
 
-def test_a_search_that_waits_for_another_is_cancelled_too() -> None:
+def test_a_search_that_waits_for_another_can_be_cancelled() -> None:
     cancel, entered = threading.Event(), threading.Event()
 
     def first() -> None:
@@ -137,19 +137,19 @@ def test_a_search_that_waits_for_another_is_cancelled_too() -> None:
     other = threading.Thread(target=first)
     other.start()
     entered.wait()
-    impatient = threading.Event()
-    impatient.set()
+    cancelled = threading.Event()
+    cancelled.set()
     with pytest.raises(CancelledError, match="cancelled after"):
-        plan(problem(), "rrt", cancel=impatient)
+        plan(problem(), "rrt", cancel=cancelled)
     threading.Timer(0.3, cancel.set).start()
     clock = Clock("rrt", None)
     made = clock.began
-    with turn(clock):
+    with hold_ompl(clock):
         assert clock.began > made  # waiting doesn't count
     other.join()
 
 
-def test_planners_that_tell_nothing_say_so() -> None:
+def test_planners_without_progress_reject_callback_and_cancel() -> None:
     with pytest.raises(
         ProblemError, match="on_improved: expected no such option, or an anytime planner: 'ara"
     ):
@@ -164,7 +164,7 @@ def test_planners_that_tell_nothing_say_so() -> None:
         plan(problem(), "rrt", on_improved=3)  # type: ignore[arg-type]
 
 
-def test_ara_tells_and_is_cancelled_through_plan_too() -> None:
+def test_ara_reports_improvements_and_can_be_cancelled() -> None:
     improvements: list[Improvement] = []
     route = plan(problem(), "ara", on_improved=improvements.append)
     assert improvements[-1].cost == route.cost
@@ -176,7 +176,7 @@ def test_ara_tells_and_is_cancelled_through_plan_too() -> None:
 
 @pytest.mark.parametrize("space", ["r2", "se2", "reeds_shepp"])
 @pytest.mark.parametrize("name", ["rrtconnect", "bitstar", "prm", "informedrrtstar"])
-def test_a_warm_start_is_never_beaten_by_what_it_began_with(name: str, space: str) -> None:
+def test_a_warm_start_never_returns_a_costlier_route_than_its_first(name: str, space: str) -> None:
     wide = grid_of(np.where(rooms(door=12), BLOCKED, FREE), resolution=0.25)
     ends: dict[str, Any] = {"start": (2.0, 2.0, 0.5), "goal": (10.0, 9.5, 1.0)}
     asked = PlanningProblem(wide, **ends, footprint=0.5 if space == "r2" else CAR)
@@ -189,14 +189,16 @@ def test_a_warm_start_is_never_beaten_by_what_it_began_with(name: str, space: st
     assert route.cost <= improvements[0].cost
     assert len(improvements[0].waypoints) > 1
     if space == "r2":
-        assert improvements[0].cost <= plan(asked, "astar").cost + 1e-9  # it is pulled tight
+        assert (
+            improvements[0].cost <= plan(asked, "astar").cost + 1e-9
+        )  # the first route is simplified
 
 
-def test_a_warm_start_brings_a_route_where_chance_finds_none() -> None:
+def test_a_warm_start_solves_a_problem_that_random_samples_do_not() -> None:
     assert plan(needle(), "rrtconnect", warm_start=True, iterations=200).audit == "clean"
 
 
-def test_a_warm_start_that_finds_none_is_a_cold_one() -> None:
+def test_a_warm_start_without_a_first_route_searches_without_one() -> None:
     narrow = rooms()
     narrow[24:27, 8:16] = narrow[24:27, 32:40] = True
     narrow[24:27, 10:15] = False  # 1.25 m, the car is 0.9 m wide, its disc 2.2 m
@@ -207,33 +209,33 @@ def test_a_warm_start_that_finds_none_is_a_cold_one() -> None:
     assert route.audit == "clean"
 
 
-def test_no_better_line_lies_outside_the_better_region() -> None:
+def test_the_informed_region_contains_all_shorter_lines() -> None:
     rng = np.random.default_rng(5)
-    start, goal, longest = (2.3, 4.1), (8.2, 7.7), 8.5
-    region = better_region(np.ones((24, 24), dtype=np.bool_), 0.5, start, [goal], longest)
+    start, goal, max_length = (2.3, 4.1), (8.2, 7.7), 8.5
+    region = informed_region(np.ones((24, 24), dtype=np.bool_), 0.5, start, [goal], max_length)
     places = rng.uniform(0, 12, (4000, 2))
     detour = [math.dist(start, place) + math.dist(place, goal) for place in places]
     inside = region[tuple((places // 0.5).astype(int).T[::-1])]
-    assert inside[np.array(detour) <= longest].all()
+    assert inside[np.array(detour) <= max_length].all()
     assert not inside.all()
 
 
 @pytest.mark.parametrize("space", ["r2", "se2"])
-def test_draws_are_clear_and_reach_the_narrowest_places(space: Any) -> None:
+def test_samples_are_clear_and_cover_narrow_passages(space: Any) -> None:
     z = np.full((64, 64), BLOCKED, dtype=np.float32)
     z[4:14, 4:60] = z[50:60, 4:60] = FREE
     z[14:50, 30:33] = FREE  # 0.75 m wide
     grid = grid_of(z, resolution=0.25)
     footprint = 0.3 if space == "r2" else [(-0.3, -0.3), (0.4, -0.3), (0.4, 0.3), (-0.3, 0.3)]
     asked = PlanningProblem(grid, start=(3, 2, 0), goal=(12, 13, 0), footprint=footprint)
-    validator = MotionValidator(Costmap.of(asked), space, 1.0)
+    validator = MotionValidator2D(Costmap.of(asked), space, 1.0)
     start = validator.state_of((3, 2, 0))
     sampler = StateSampler(validator, validator.region(start), seed=0, first=[start])
-    assert sampler.anywhere() == start
-    states = [state for state in (sampler.anywhere() for _ in range(2000)) if state is not None]
+    assert sampler.sample() == start
+    states = [state for state in (sampler.sample() for _ in range(2000)) if state is not None]
     assert len(states) == 2000
     assert all(validator.is_clear(*state, *state) for state in states)
     rows = np.array(states)[:, 1] / 0.25 - validator.state_of((0, 0, 0))[1] / 0.25
     assert ((rows > 14) & (rows < 50)).sum() > 0
-    near = [sampler.near(start, 0.2) for _ in range(50)]
+    near = [sampler.sample_near(start, 0.2) for _ in range(50)]
     assert all(s is not None and math.dist(s[:2], start[:2]) <= 0.2 * math.sqrt(2) for s in near)

@@ -1,4 +1,4 @@
-"""Sampling planners: OMPL's names, our checks, honest ends."""
+"""Sampling planners: OMPL's names, our checks, and errors for every failure."""
 
 from __future__ import annotations
 
@@ -33,11 +33,12 @@ from planners import (
 )
 from planners.costmap.costmap import Costmap
 from planners.sampling.improvement_reporter import ImprovementReporter
-from planners.sampling.motion_validator import MotionValidator
-from planners.sampling.objectives import HEEDING, Objective
+from planners.sampling.motion_validator2d import MotionValidator2D
+from planners.sampling.objectives import COST_AWARE, Objective
 from planners.sampling.ompl_module import samplers
+from planners.sampling.ompl_parameters import PARAMETERS, setter_of
 from planners.sampling.ompl_search import REASONS, THREADED, OmplSearch
-from planners.sampling.settings import PARAMETERS, REFUSED, StateSpace, refusal, setter_of
+from planners.sampling.settings import REFUSED, StateSpace, refusal
 from planners.sampling.task import Task
 from planners.sampling.threaded_solve import EXACT
 from planners.search.base import Clock
@@ -46,7 +47,7 @@ NAMES = sorted(samplers())
 SPACES: tuple[StateSpace, ...] = tuple(space for space in get_args(StateSpace) if space != "r3")
 PAIRS = [(name, space) for name, space in product(NAMES, SPACES) if refusal(name, space) is None]
 R2 = sorted({name for name, _ in PAIRS})
-BETTERING = ["bitstar", "informedrrtstar", "prmstar", "rrtstar", "sorrtstar"]
+ANYTIME = ["bitstar", "informedrrtstar", "prmstar", "rrtstar", "sorrtstar"]
 CAR = [(-0.5, -0.45), (1.0, -0.45), (1.0, 0.45), (-0.5, 0.45)]
 QUICK = ["bkpiece1", "kpiece1", "rrtconnect"]
 needs_ompl = pytest.mark.skipif(not NAMES, reason="ompl is not installed")
@@ -66,15 +67,15 @@ def problem(space: StateSpace = "r2", **values: Any) -> PlanningProblem:
     return PlanningProblem(ROOMS, **(asked | values))
 
 
-def counted(name: str, **told: Any) -> dict[str, Any]:
-    """Return settings with which a planner ends soon, and repeats itself if it ever does."""
+def short_run(name: str, **options: Any) -> dict[str, Any]:
+    """Return settings with which a planner ends soon, and repeatably if it can."""
     if name in THREADED:
-        return told | {"improve_for": 0.1}
-    return told | {"iterations": 1000 if name in BETTERING else 20_000}
+        return options | {"improve_for": 0.1}
+    return options | {"iterations": 1000 if name in ANYTIME else 20_000}
 
 
-def routed(name: str, space: StateSpace, **told: Any) -> Route:
-    return plan(problem(space), name, space=space, **counted(name, **told))
+def plan_route(name: str, space: StateSpace, **options: Any) -> Route:
+    return plan(problem(space), name, space=space, **short_run(name, **options))
 
 
 def python(script: str) -> subprocess.CompletedProcess[str]:
@@ -94,12 +95,12 @@ problem = PlanningProblem(grid, start=(2, 2, 0), goal=(30, 6, 0), footprint=0.9)
 """
 
 
-def test_who_asks_for_a_planner_of_ours_waits_for_no_ompl() -> None:
+def test_our_own_planners_do_not_import_ompl() -> None:
     ran = python(SMALL + 'plan(problem); "jps" in PLANNERS; print("ompl" in sys.modules)')
     assert (ran.stdout, ran.stderr) == ("False\n", "")
 
 
-def test_without_ompl_there_are_our_planners_and_a_hint() -> None:
+def test_without_ompl_there_are_our_own_planners_and_a_hint() -> None:
     ran = python(
         'import sys; sys.modules["ompl"] = None\n'
         + SMALL
@@ -110,13 +111,13 @@ def test_without_ompl_there_are_our_planners_and_a_hint() -> None:
     assert ran.stdout.endswith("got 'rrtconnect'. Sampling planners need OMPL: pip install ompl.\n")
 
 
-def test_a_name_that_no_planner_has_is_answered_with_those_there_are() -> None:
+def test_an_unknown_planner_raises_an_error_that_lists_the_planners() -> None:
     with pytest.raises(ProblemError, match=r"one of (aorrtc, )?ara, astar, .*, got 'rrt_connect'"):
         plan(problem(), "rrt_connect")
 
 
 @needs_ompl
-def test_planners_of_ompl_stand_beside_our_own() -> None:
+def test_planners_of_ompl_are_listed_beside_our_own() -> None:
     assert {"rrt", "rrtconnect", "rrtstar", "bitstar", "fmt", "prm", "bkpiece1"} <= set(NAMES)
     assert set(PLANNERS) == set(OWN_PLANNERS) | set(NAMES)
     assert len(PLANNERS) == len(OWN_PLANNERS) + len(NAMES)
@@ -125,10 +126,10 @@ def test_planners_of_ompl_stand_beside_our_own() -> None:
 
 
 @pytest.mark.parametrize(("name", "space"), PAIRS)
-def test_every_planner_finds_its_way_through_the_rooms_in_every_space(
+def test_every_planner_finds_a_route_through_the_rooms_in_every_space(
     name: str, space: StateSpace
 ) -> None:
-    route = routed(name, space)
+    route = plan_route(name, space)
     assert route.audit == "clean"
     assert route.planner == name
     assert route.bound is None
@@ -143,10 +144,8 @@ def test_every_planner_finds_its_way_through_the_rooms_in_every_space(
     ("name", "space"),
     [(name, s) for name, s in PAIRS if name not in THREADED and (s == "r2" or name in QUICK)],
 )
-def test_a_seed_repeats_its_route_exactly_and_another_brings_another(
-    name: str, space: StateSpace
-) -> None:
-    first, again, other = (routed(name, space, seed=seed) for seed in (3, 3, 4))
+def test_equal_seeds_repeat_the_route_and_other_seeds_do_not(name: str, space: StateSpace) -> None:
+    first, again, other = (plan_route(name, space, seed=seed) for seed in (3, 3, 4))
     np.testing.assert_array_equal(again.waypoints, first.waypoints)
     np.testing.assert_array_equal(again.headings, first.headings)
     assert again.expanded == first.expanded
@@ -160,8 +159,8 @@ def test_planners_that_run_threads_are_flagged_as_not_repeatable() -> None:
 
 @pytest.mark.parametrize("space", ["dubins", "reeds_shepp"])
 @needs_ompl
-def test_curves_turn_no_tighter_than_told(space: StateSpace) -> None:
-    route = routed("rrtconnect", space, turning_radius=0.8)
+def test_curves_turn_no_tighter_than_the_turning_radius(space: StateSpace) -> None:
+    route = plan_route("rrtconnect", space, turning_radius=0.8)
     turns = np.diff(route.headings)
     turns = np.abs(np.remainder(turns + np.pi, 2.0 * np.pi) - np.pi)
     chords = np.hypot(*np.diff(route.waypoints, axis=0).T)
@@ -170,7 +169,7 @@ def test_curves_turn_no_tighter_than_told(space: StateSpace) -> None:
 
 @needs_ompl
 def test_the_space_follows_from_the_footprint_and_the_yaws() -> None:
-    told = SamplingSettings()
+    options = SamplingSettings()
     cart = [(-0.4, -0.3), (0.6, -0.3), (0.6, 0.3), (-0.4, 0.3)]
     for footprint, start, space in [
         (0.5, (2, 2, 0.5), "r2"),
@@ -178,8 +177,8 @@ def test_the_space_follows_from_the_footprint_and_the_yaws() -> None:
         (cart, (2, 2, 0.5), "se2"),
     ]:
         asked = problem(footprint=footprint, start=start)
-        assert told.space_for(asked.shape, start, (10, 9.5, 1)) == space
-        route = plan(asked, "rrtconnect", **counted("rrtconnect"))
+        assert options.space_for(asked.shape, start, (10, 9.5, 1)) == space
+        route = plan(asked, "rrtconnect", **short_run("rrtconnect"))
         dense = np.hypot(*np.diff(route.waypoints, axis=0).T).max() <= 0.125 + 1e-9
         assert dense == (space == "se2")
 
@@ -199,13 +198,15 @@ def test_a_car_passes_where_the_disc_around_it_does_not() -> None:
 
 @pytest.mark.parametrize(("name", "space"), sorted(REFUSED, key=str))
 @needs_ompl
-def test_what_crashes_or_can_not_be_driven_is_refused(name: str, space: StateSpace | None) -> None:
+def test_planners_that_crash_or_return_invalid_paths_are_rejected(
+    name: str, space: StateSpace | None
+) -> None:
     with pytest.raises(ProblemError, match=rf"one that works in .*, got {name}\. .*: take"):
         plan(problem(space or "r2"), name, space=space or "r2")
 
 
 @needs_ompl
-def test_no_status_of_ompl_is_forgotten() -> None:
+def test_every_status_of_ompl_has_a_message() -> None:
     from ompl import base  # noqa: PLC0415
 
     statuses = {status.name for status in base.PlannerStatus.PlannerStatusType}
@@ -213,9 +214,9 @@ def test_no_status_of_ompl_is_forgotten() -> None:
 
 
 @needs_ompl
-def test_what_ompl_throws_becomes_a_reason() -> None:
-    validator, told, clock = (
-        MotionValidator(Costmap.of(problem()), "r2", 1.0),
+def test_exceptions_of_ompl_become_a_reason() -> None:
+    validator, options, clock = (
+        MotionValidator2D(Costmap.of(problem()), "r2", 1.0),
         SamplingSettings(),
         Clock("rrt", 5.0),
     )
@@ -224,21 +225,21 @@ def test_what_ompl_throws_becomes_a_reason() -> None:
         name="rrt",
         validator=validator,
         region=validator.region(start),
-        room=(9.0, 9.0, 1.0, 1.0),  # its far corner comes before the near one
+        bounds=(9.0, 9.0, 1.0, 1.0),  # lower and upper corner swapped
         start=start,
         goals=[goal],
-        objective=Objective(validator, told),
-        settings=told,
+        objective=Objective(validator, options),
+        settings=options,
         clock=clock,
         reporter=ImprovementReporter(clock, None),
         first=[],
-        asked=((2, 2), (9, 9)),
+        query=((2, 2), (9, 9)),
     )
-    assert OmplSearch(task).outcome().status.startswith("OMPL says: ")
+    assert OmplSearch(task).run().status.startswith("OMPL reports: ")
 
 
 @needs_ompl
-def test_a_way_that_ends_beside_the_goal_is_none() -> None:
+def test_a_path_that_ends_beside_the_goal_is_no_route() -> None:
     with pytest.raises(UnsolvedError, match=r"in iterations = 3 \(\d+ edges .* m left") as caught:
         plan(problem(), "rrt", iterations=3, range=0.5)
     assert caught.value.left is not None
@@ -249,10 +250,10 @@ def test_a_way_that_ends_beside_the_goal_is_none() -> None:
 
 @pytest.mark.parametrize("name", sorted(set(R2) - set(THREADED)))
 @pytest.mark.usefixtures("ticking")
-def test_time_that_ran_out_is_told_and_ends_no_process(name: str) -> None:
+def test_a_time_limit_raises_an_error_and_does_not_crash(name: str) -> None:
     z = free_field(48, 48)
     z[20:28] = BLOCKED
-    z[20:28, 22:24] = FREE  # 0.5 m, which nobody finds in time: the disc is as wide
+    z[20:28, 22:24] = FREE  # 0.5 m, too narrow to be found in time: the disc is as wide
     grid = grid_of(z, resolution=0.25)
     asked = PlanningProblem(grid, start=(2, 2), goal=(9.5, 10), footprint=0.2499)
     with pytest.raises(TimeLimitError, match=r"no route within time_limit = 0.1 s") as caught:
@@ -263,20 +264,20 @@ def test_time_that_ran_out_is_told_and_ends_no_process(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", R2)
-def test_no_time_is_no_route(name: str) -> None:
+def test_a_time_limit_of_zero_gives_no_route(name: str) -> None:
     with pytest.raises(TimeLimitError, match=r"no route within time_limit = 0 s \(0 nodes"):
         plan(problem(), name, time_limit=0)
 
 
 @pytest.mark.parametrize(("name", "space"), PAIRS)
-def test_a_start_that_is_the_goal_is_a_route_of_no_length(name: str, space: StateSpace) -> None:
+def test_a_start_at_the_goal_gives_a_route_of_zero_length(name: str, space: StateSpace) -> None:
     route = plan(problem(space, goal=(2.0, 2.0, 0.5)), name, space=space)
     assert route.length == 0.0
     assert route.waypoints.tolist() == [[2.0, 2.0]] * 2
 
 
 @needs_ompl
-def test_a_wall_all_across_is_proved_to_enclose_at_once() -> None:
+def test_a_continuous_wall_encloses_without_a_search() -> None:
     z = free_field(48, 48)
     z[30] = BLOCKED
     for space in SPACES:
@@ -287,20 +288,20 @@ def test_a_wall_all_across_is_proved_to_enclose_at_once() -> None:
             plan(asked, "rrtconnect", space=space, time_limit=None)
 
 
-@pytest.mark.parametrize("name", sorted(set(R2) - HEEDING))
-def test_who_heeds_no_costs_says_so(name: str) -> None:
+@pytest.mark.parametrize("name", sorted(set(R2) - COST_AWARE))
+def test_planners_without_cost_support_are_rejected_on_costs(name: str) -> None:
     asked = problem(costs=CostSettings(clearance_weight=1.0))
-    with pytest.raises(ProblemError, match=r"heeds costs and times in .* these: bfmt, bi"):
+    with pytest.raises(ProblemError, match=r"supports costs and times in .* these: bfmt, bi"):
         plan(asked, name)
 
 
-@pytest.mark.parametrize("name", sorted(HEEDING))
+@pytest.mark.parametrize("name", sorted(COST_AWARE))
 @needs_ompl
-def test_dear_cells_are_weighed(name: str) -> None:
+def test_costs_increase_the_clearance(name: str) -> None:
     asked = problem(costs=CostSettings(clearance_weight=3.0))
-    route = plan(asked, name, **counted(name))
+    route = plan(asked, name, **short_run(name))
     assert route.cost > route.length
-    assert route.mean_clearance > plan(problem(), name, **counted(name)).mean_clearance
+    assert route.mean_clearance > plan(problem(), name, **short_run(name)).mean_clearance
 
 
 @needs_ompl
@@ -313,7 +314,7 @@ def test_curved_spaces_need_yaws() -> None:
 
 
 @needs_ompl
-def test_every_parameter_is_some_planners_and_others_refuse_it() -> None:
+def test_every_parameter_belongs_to_a_planner_and_the_others_reject_it() -> None:
     from ompl import geometric  # noqa: PLC0415
 
     for name in PARAMETERS:
@@ -327,8 +328,8 @@ def test_every_parameter_is_some_planners_and_others_refuse_it() -> None:
 
 
 @needs_ompl
-def test_parameters_reach_the_planner() -> None:
-    short, long = (routed("rrt", "r2", range=step, simplify=False) for step in (0.5, 5.0))
+def test_parameters_are_passed_to_the_planner() -> None:
+    short, long = (plan_route("rrt", "r2", range=step, simplify=False) for step in (0.5, 5.0))
     assert np.hypot(*np.diff(short.waypoints, axis=0).T).max() <= 0.5 + 1e-9
     assert len(short.waypoints) > len(long.waypoints)
 
@@ -338,7 +339,8 @@ def test_parameters_reach_the_planner() -> None:
 def test_simplification_never_lengthens(space: StateSpace) -> None:
     for seed in range(5):
         lengths = [
-            routed("rrt", space, seed=seed, simplify=simplify).length for simplify in (False, True)
+            plan_route("rrt", space, seed=seed, simplify=simplify).length
+            for simplify in (False, True)
         ]
         assert lengths[1] <= lengths[0] + 1e-9
 
@@ -351,11 +353,11 @@ def test_a_search_can_be_interrupted(name: str) -> None:
     with pytest.raises(KeyboardInterrupt, match=r"^$"):
         plan(problem(), name, improve_for=20)
     timer.join()
-    assert routed(name, "r2").audit == "clean"
+    assert plan_route(name, "r2").audit == "clean"
 
 
 @needs_ompl
-def test_threads_take_turns() -> None:
+def test_searches_in_threads_return_the_same_routes() -> None:
     pairs = [((2, 2), (9, y)) for y in (2.0, 3.0, 8.0, 9.0)]
     alone = plan_many(problem(), pairs, "rrtconnect", threads=1, iterations=4000)
     many = plan_many(problem(), pairs, "rrtconnect", threads=4, iterations=4000)
@@ -374,9 +376,9 @@ def test_nothing_is_printed_and_nothing_leaks_at_exit() -> None:
 
 
 @needs_ompl
-def test_what_ompl_says_is_logged(caplog: pytest.LogCaptureFixture) -> None:
+def test_messages_of_ompl_are_logged(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.DEBUG, logger="planners.sampling"):
-        routed("rrtconnect", "r2")
+        plan_route("rrtconnect", "r2")
     assert any("Starting planning" in record.getMessage() for record in caplog.records)
 
 

@@ -1,4 +1,4 @@
-"""Trees and roadmaps as arrays: what OMPL grew, checked against its own answers."""
+"""Trees and roadmaps as arrays, compared with those of OMPL."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ import pytest
 from oracles_planning import BLOCKED, FREE, grid_of
 from planners import PlanningProblem, SamplingSettings
 from planners.costmap.costmap import Costmap
+from planners.geometry.polyline import length_of
 from planners.problem.problem import Pose
-from planners.sampling.motion_validator import MotionValidator
+from planners.sampling.motion_validator2d import MotionValidator2D
 from planners.sampling.ompl_module import ompl, redirect_log, samplers
 from planners.sampling.ompl_states import edge_check, reader, space_of, state_of
 from planners.sampling.planner_data import graph_of
@@ -25,26 +26,26 @@ SPACES: list[StateSpace] = ["r2", "se2", "dubins", "reeds_shepp"]
 pytestmark = pytest.mark.skipif(not samplers(), reason="ompl is not installed")
 
 
-def ways_in(space: StateSpace) -> MotionValidator:
+def validator_in(space: StateSpace) -> MotionValidator2D:
     field = np.full((48, 48), FREE, dtype=np.float32)
     field[:36, 24] = BLOCKED
     grid = grid_of(field, resolution=0.25, origin=(-3.0, 7.0))
     ends: dict[str, Any] = {"start": (0, 9, 0), "goal": (0, 9, 0)}
     problem = PlanningProblem(grid, **ends, footprint=CAR, clear_start=False)
-    return MotionValidator(Costmap.of(problem), space, 1.0)
+    return MotionValidator2D(Costmap.of(problem), space, 1.0)
 
 
-def searched(
-    name: str, validator: MotionValidator, *, looks: int = 300
+def search(
+    name: str, validator: MotionValidator2D, *, iterations: int = 300
 ) -> tuple[Graph, list[Pose], list[tuple[int, int]]]:
-    """Return what a planner grew in so many looks, and states and edges as OMPL lists them."""
+    """Return the graph of a planner, and the states and edges that OMPL lists."""
     base, geometric, util = ompl()
     with redirect_log():
         util.RNG.setSeed(1)
         begin, end = validator.state_of((0.0, 9.0, 0.0)), validator.state_of((6.0, 9.0, 1.0))
-        room = validator.room(begin, end)
-        assert room is not None
-        space = space_of(base, validator.space, room, SamplingSettings())
+        bounds = validator.bounds(begin, end)
+        assert bounds is not None
+        space = space_of(base, validator.space, bounds, SamplingSettings())
         information = base.SpaceInformation(space)
         read = reader(validator.space)
         information.setStateValidityChecker(lambda state: validator.is_clear(*2 * read(state)))
@@ -59,14 +60,14 @@ def searched(
         planner.setProblemDefinition(definition)
         planner.setup()
         asked = count()
-        stop = base.PlannerTerminationCondition(lambda: next(asked) >= looks)
+        stop = base.PlannerTerminationCondition(lambda: next(asked) >= iterations)
         (planner.growRoadmapPtc if name == "PRM" else planner.solve)(stop)
         graph = graph_of(base, planner, information, validator)
         return graph, *_listed(base, planner, information, validator)
 
 
 def _listed(
-    base: Any, planner: Any, information: Any, validator: MotionValidator
+    base: Any, planner: Any, information: Any, validator: MotionValidator2D
 ) -> tuple[list[Pose], list[tuple[int, int]]]:
     data = base.PlannerData(information)
     planner.getPlannerData(data)
@@ -85,9 +86,9 @@ GROWN = [
 
 
 @pytest.mark.parametrize(("name", "space"), GROWN)
-def test_every_edge_that_ompl_has_is_there_once(name: str, space: StateSpace) -> None:
-    validator = ways_in(space)
-    graph, states, listed = searched(name, validator)
+def test_every_edge_of_ompl_occurs_once(name: str, space: StateSpace) -> None:
+    validator = validator_in(space)
+    graph, states, listed = search(name, validator)
     assert graph.vertices.shape == (len(states), 2 if space == "r2" else 3)
     shifted = np.array(states)
     shifted[:, :2] += validator.costmap.window.origin
@@ -103,30 +104,30 @@ def test_every_edge_that_ompl_has_is_there_once(name: str, space: StateSpace) ->
 
 
 @pytest.mark.parametrize("space", SPACES)
-def test_vertices_are_clear_places_on_the_map_and_edges_are_as_long_as_they_say(
+def test_vertices_are_clear_and_weights_are_the_lengths_of_edges(
     space: StateSpace,
 ) -> None:
-    validator = ways_in(space)
-    graph, *_ = searched("RRT", validator)
+    validator = validator_in(space)
+    graph, *_ = search("RRT", validator)
     states = [validator.state_of(tuple(vertex)) for vertex in graph.vertices.tolist()]
     assert all(validator.is_clear(*state, *state) for state in states)
     for (a, b), weight in zip(graph.edges.tolist(), graph.weights.tolist(), strict=True):
         assert validator.is_clear(*states[a], *states[b])
-        length = validator.length([states[a], states[b]])
+        length = length_of(validator.poses([states[a], states[b]])[:, :2])
         assert weight == pytest.approx(length, rel=0.02)  # chords of curves are a little shorter
         assert weight >= length - 1e-9
 
 
-def test_a_planner_that_grew_nothing_is_a_graph_without_edges() -> None:
+def test_an_empty_tree_is_a_graph_without_edges() -> None:
     for space in SPACES:
-        graph, *_ = searched("PRM", ways_in(space), looks=1)
+        graph, *_ = search("PRM", validator_in(space), iterations=1)
         assert graph.edges.shape == (0, 2)
         assert graph.weights.shape == (0,)
         assert graph.vertices.shape[1] == (2 if space == "r2" else 3)
 
 
-def test_a_graph_outlives_all_that_is_of_ompl() -> None:
-    graph = searched("RRTConnect", ways_in("se2"))[0]
+def test_a_graph_outlives_the_objects_of_ompl() -> None:
+    graph = search("RRTConnect", validator_in("se2"))[0]
     gc.collect()
     for array in (graph.vertices, graph.edges, graph.weights):
         assert array.base is None or isinstance(array.base, np.ndarray)

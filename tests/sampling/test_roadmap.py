@@ -1,4 +1,4 @@
-"""Roadmaps: grown once, asked many times, and every route held to what a plan is held to."""
+"""Roadmaps: grown once, queried many times; their routes meet the same requirements as plans."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from planners import (
 )
 from planners.costmap.costmap import Costmap
 from planners.sampling.kernels.roadmap import cheapest_path
-from planners.sampling.motion_validator import MotionValidator
+from planners.sampling.motion_validator2d import MotionValidator2D
 from planners.sampling.ompl_module import samplers
 from planners.sampling.roadmap import Roadmap
 from planners.sampling.settings import StateSpace
@@ -64,10 +64,10 @@ def problem(
     return PlanningProblem(grid, **(asked | values))
 
 
-def grown(space: StateSpace = "r2", asked: PlanningProblem | None = None, **told: Any) -> Roadmap:
+def grow(space: StateSpace = "r2", asked: PlanningProblem | None = None, **options: Any) -> Roadmap:
     """Return a roadmap that is the same every time."""
     asked = problem(space) if asked is None else asked
-    return Roadmap.grow(asked, seconds=600, space=space, **({"iterations": 1500} | told))
+    return Roadmap.grow(asked, seconds=600, space=space, **({"iterations": 1500} | options))
 
 
 def pose(rng: np.random.Generator) -> tuple[float, ...]:
@@ -76,8 +76,8 @@ def pose(rng: np.random.Generator) -> tuple[float, ...]:
 
 @pytest.mark.parametrize("space", SPACES)
 @needs_ompl
-def test_one_roadmap_answers_many_queries(space: StateSpace) -> None:
-    roadmap = grown(space)
+def test_one_roadmap_serves_many_queries(space: StateSpace) -> None:
+    roadmap = grow(space)
     rng = np.random.default_rng(0)
     solved = 0
     for _ in range(60):
@@ -97,8 +97,8 @@ def test_one_roadmap_answers_many_queries(space: StateSpace) -> None:
 
 
 @needs_ompl
-def test_routes_are_hardly_longer_than_the_shortest_ones() -> None:
-    roadmap = grown(iterations=4000)
+def test_routes_are_little_longer_than_the_shortest_ones() -> None:
+    roadmap = grow(iterations=4000)
     rng = np.random.default_rng(1)
     ratios: list[float] = []
     while len(ratios) < 30:
@@ -127,9 +127,9 @@ def test_the_cheapest_path_is_that_of_scipy(rng: np.random.Generator, count: int
     source_costs = rng.uniform(0.0, 5.0, 3)
     target_costs = np.hypot(*(places - goal).T) * rng.uniform(1.0, 2.0, count)
     target_costs[rng.random(count) < 0.7] = math.inf
-    told = (first, heads, costs, places, 1.0, goal, sources, source_costs, target_costs)
-    path = cheapest_path(*told).tolist()
-    # A vertex more to begin with, and of edges between the same vertices the cheapest.
+    options = (first, heads, costs, places, 1.0, goal, sources, source_costs, target_costs)
+    path = cheapest_path(*options).tolist()
+    # An additional source vertex; of parallel edges the cheapest.
     table = np.full((count + 1, count + 1), math.inf)
     np.minimum.at(table, (tails, heads), costs)
     np.minimum.at(table, (np.full(3, count), sources), source_costs)
@@ -144,10 +144,10 @@ def test_the_cheapest_path_is_that_of_scipy(rng: np.random.Generator, count: int
 
 @pytest.mark.parametrize("space", SPACES)
 @needs_ompl
-def test_all_of_a_roadmap_is_clear_and_reached_from_the_start(space: StateSpace) -> None:
+def test_edges_are_clear_and_vertices_reachable_from_the_start(space: StateSpace) -> None:
     field = np.where(rooms(), BLOCKED, FREE)
     field[:, 24] = BLOCKED  # the rooms on the right can't be reached
-    roadmap = grown(space, problem(space, grid_of(field, resolution=0.25)), iterations=600)
+    roadmap = grow(space, problem(space, grid_of(field, resolution=0.25)), iterations=600)
     validator, graph = roadmap.validator, roadmap.graph
     states = [validator.state_of(tuple(vertex)) for vertex in graph.vertices.tolist()]
     assert len(graph.edges) > 100
@@ -156,8 +156,8 @@ def test_all_of_a_roadmap_is_clear_and_reached_from_the_start(space: StateSpace)
 
 
 @needs_ompl
-def test_with_iterations_growth_repeats_exactly_and_a_seed_brings_another() -> None:
-    first, again, other = (grown(seed=seed, iterations=400) for seed in (1, 1, 2))
+def test_with_iterations_equal_seeds_repeat_growth_and_other_seeds_do_not() -> None:
+    first, again, other = (grow(seed=seed, iterations=400) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first.graph.vertices, again.graph.vertices)
     np.testing.assert_array_equal(first.graph.edges, again.graph.edges)
     assert not np.array_equal(first.graph.vertices, other.graph.vertices)
@@ -167,7 +167,7 @@ def test_with_iterations_growth_repeats_exactly_and_a_seed_brings_another() -> N
 
 @pytest.mark.parametrize("planner", ["prm", "prmstar"])
 @needs_ompl
-def test_prm_and_its_star_grow_for_as_long_as_told(planner: str) -> None:
+def test_roadmaps_of_prm_and_prmstar_grow_with_the_time(planner: str) -> None:
     sizes = []
     for seconds in (0.02, 0.5):
         roadmap = Roadmap.grow(problem(), seconds=seconds, planner=planner)
@@ -177,15 +177,15 @@ def test_prm_and_its_star_grow_for_as_long_as_told(planner: str) -> None:
 
 
 @needs_ompl
-def test_neighbours_are_as_many_as_told() -> None:
-    few, many = (grown(iterations=400, max_nearest_neighbors=most) for most in (2, 20))
+def test_max_nearest_neighbors_limits_the_edges() -> None:
+    few, many = (grow(iterations=400, max_nearest_neighbors=most) for most in (2, 20))
     assert len(many.graph.edges) > 3 * len(few.graph.edges)
 
 
 @pytest.mark.parametrize("space", SPACES)
 @needs_ompl
-def test_what_is_left_out_makes_no_route_longer(space: StateSpace) -> None:
-    plain, simplified = (grown(space, simplify=simplify) for simplify in (False, True))
+def test_simplification_makes_no_route_costlier(space: StateSpace) -> None:
+    plain, simplified = (grow(space, simplify=simplify) for simplify in (False, True))
     rng = np.random.default_rng(2)
     shorter = 0
     for _ in range(40):
@@ -200,12 +200,14 @@ def test_what_is_left_out_makes_no_route_longer(space: StateSpace) -> None:
 
 
 @needs_ompl
-def test_dear_cells_are_gone_around() -> None:
+def test_routes_avoid_costly_cells() -> None:
     field = free_field(48, 48)
-    field[:30, 20:28] = -0.3  # hardly sure
+    field[:30, 20:28] = -0.3  # low confidence
     grid = grid_of(field, resolution=0.25)
     costs = CostSettings(confidence_weight=10.0)
-    near, far = (grown(asked=problem(grid=grid, costs=told)) for told in (CostSettings(), costs))
+    near, far = (
+        grow(asked=problem(grid=grid, costs=options)) for options in (CostSettings(), costs)
+    )
     ends = (2.0, 2.0), (10.0, 2.0)
     assert near.plan(*ends).length == pytest.approx(8.0)
     around = far.plan(*ends)
@@ -214,24 +216,24 @@ def test_dear_cells_are_gone_around() -> None:
 
 
 @needs_ompl
-def test_time_counts_if_it_is_told_to() -> None:
-    roadmap = grown("se2", time_weight=1.0, max_speed=0.5)
+def test_a_time_weight_adds_the_duration() -> None:
+    roadmap = grow("se2", time_weight=1.0, max_speed=0.5)
     route = roadmap.plan((2, 2, 0), (4, 2, 0))
     assert route.length == pytest.approx(2.0)
     assert route.cost == pytest.approx(2.0 + 4.0)
 
 
 @needs_ompl
-def test_a_start_that_is_the_goal_is_a_route_of_no_length() -> None:
+def test_a_start_at_the_goal_gives_a_route_of_zero_length() -> None:
     for space in SPACES:
-        route = grown(space, iterations=100).plan((2, 2, 0.5), (2, 2, 0.5))
+        route = grow(space, iterations=100).plan((2, 2, 0.5), (2, 2, 0.5))
         assert route.length == 0.0
         assert route.waypoints.tolist() == [[2.0, 2.0]] * 2
 
 
 @needs_ompl
-def test_places_that_are_none_are_answered_as_by_plan() -> None:
-    roadmap = grown("se2", iterations=300)
+def test_invalid_places_raise_the_same_errors_as_plan() -> None:
+    roadmap = grow("se2", iterations=300)
     with pytest.raises(NonFreeError, match=r"start \(6.00, 6.00\): the footprint \(at yaw 0.00"):
         roadmap.plan((6, 6, 0), (10, 9.5, 1))
     with pytest.raises(UnknownSpaceError, match=r"goal \(12.00, 11.00\)"):
@@ -248,28 +250,29 @@ def test_places_that_are_none_are_answered_as_by_plan() -> None:
 
 @pytest.mark.parametrize("space", SPACES)
 @needs_ompl
-def test_that_there_is_no_route_is_said_only_where_it_is_proved(space: StateSpace) -> None:
+def test_enclosed_is_raised_only_if_it_is_proved(space: StateSpace) -> None:
     field = np.where(rooms(), BLOCKED, FREE)
     field[24, 8:16] = field[24, 32:40] = BLOCKED
-    walled = grown(space, problem(space, grid_of(field, resolution=0.25)), iterations=300)
+    walled = grow(space, problem(space, grid_of(field, resolution=0.25)), iterations=300)
     with pytest.raises(EnclosedError, match=r"no route: the (start|goal) is enclosed"):
         walled.plan((2, 2, 0), (2, 10, 0))
-    bare = grown(space, iterations=2)
+    bare = grow(space, iterations=2)
     with pytest.raises(
-        UnsolvedError, match=r"roadmap: no route found: its \d+ places don't .* \(\d+ edges checked"
+        UnsolvedError,
+        match=r"roadmap: no route found: its \d+ vertices do not .* \(\d+ edges checked",
     ):
         bare.plan((2, 2, 0), (10, 10, 0))
     assert bare.plan((2, 2, 0), (2.5, 2, 0)).audit == "clean"
 
 
 @needs_ompl
-def test_the_cleared_start_stays_where_the_problem_has_it() -> None:
+def test_only_the_start_of_the_problem_is_cleared() -> None:
     field = free_field(48, 48)
     field[4:10, 4:10] = UNSEEN
     field[30:36, 30:36] = UNSEEN
     grid = grid_of(field, resolution=0.25)
     asked = problem(grid=grid, start=(1.75, 1.75), clear_start=True, clear_start_radius=2.0)
-    roadmap = grown(asked=asked)
+    roadmap = grow(asked=asked)
     assert roadmap.plan((10, 2), (1.75, 1.75)).unknown_length > 0.0
     with pytest.raises(UnknownSpaceError, match=r"start \(8.25, 8.25\)"):
         roadmap.plan((8.25, 8.25), (10, 2))
@@ -277,11 +280,11 @@ def test_the_cleared_start_stays_where_the_problem_has_it() -> None:
 
 @pytest.mark.parametrize("space", SPACES)
 @needs_ompl
-def test_a_file_brings_back_the_same_routes(space: StateSpace, tmp_path: Path) -> None:
-    roadmap = grown(space, turning_radius=0.8, yaw_weight=0.3)
-    roadmap.save(tmp_path / "net.npz")
+def test_a_loaded_roadmap_returns_the_same_routes(space: StateSpace, tmp_path: Path) -> None:
+    roadmap = grow(space, turning_radius=0.8, yaw_weight=0.3)
+    roadmap.save(tmp_path / "roadmap.npz")
     other_ends = problem(space, start=(9, 3, 0), goal=(3, 9, 0))
-    loaded = Roadmap.load(tmp_path / "net.npz", other_ends)
+    loaded = Roadmap.load(tmp_path / "roadmap.npz", other_ends)
     assert loaded.settings == roadmap.settings
     for name in ("vertices", "edges", "weights"):
         kept = getattr(loaded.graph, name), getattr(roadmap.graph, name)
@@ -292,21 +295,21 @@ def test_a_file_brings_back_the_same_routes(space: StateSpace, tmp_path: Path) -
 
 
 @needs_ompl
-def test_a_file_remembers_which_start_was_cleared(tmp_path: Path) -> None:
+def test_a_file_stores_the_cleared_start(tmp_path: Path) -> None:
     field = free_field(48, 48)
     field[4:10, 4:10] = UNSEEN
-    told: dict[str, Any] = {"grid": grid_of(field, resolution=0.25), "clear_start": True}
-    grown(asked=problem(**told, start=(1.75, 1.75))).save(tmp_path / "net.npz")
-    loaded = Roadmap.load(tmp_path / "net.npz", problem(**told, start=(10, 10)))
+    options: dict[str, Any] = {"grid": grid_of(field, resolution=0.25), "clear_start": True}
+    grow(asked=problem(**options, start=(1.75, 1.75))).save(tmp_path / "roadmap.npz")
+    loaded = Roadmap.load(tmp_path / "roadmap.npz", problem(**options, start=(10, 10)))
     assert loaded.plan((10, 2), (1.75, 1.75)).audit == "clean"
     with pytest.raises(FileFormatError, match="expected a roadmap of this map and footprint, got"):
-        Roadmap.load(tmp_path / "net.npz", problem(**told, cleared_at=(10, 10)))
+        Roadmap.load(tmp_path / "roadmap.npz", problem(**options, cleared_at=(10, 10)))
 
 
 @needs_ompl
-def test_a_roadmap_of_another_map_or_footprint_is_refused(tmp_path: Path) -> None:
-    file = tmp_path / "net.npz"
-    grown(iterations=200).save(file)
+def test_a_roadmap_of_another_map_or_footprint_is_rejected(tmp_path: Path) -> None:
+    file = tmp_path / "roadmap.npz"
+    grow(iterations=200).save(file)
     blocked = rooms()
     blocked[40, 40] = True
     changed = grid_of(np.where(blocked, BLOCKED, FREE), resolution=0.25)
@@ -316,14 +319,16 @@ def test_a_roadmap_of_another_map_or_footprint_is_refused(tmp_path: Path) -> Non
         with pytest.raises(FileFormatError, match="a roadmap of this map and footprint, got"):
             Roadmap.load(file, problem(grid=asked))
     for other in (problem(footprint=0.45), problem("se2")):
-        with pytest.raises(FileFormatError, match=r"one that was grown over .* Grow another one\."):
+        with pytest.raises(
+            FileFormatError, match=r"one that was grown on .* Grow another roadmap\."
+        ):
             Roadmap.load(file, other)
 
 
 @needs_ompl
-def test_damaged_files_are_refused(tmp_path: Path) -> None:
-    file = tmp_path / "net.npz"
-    grown(iterations=200).save(file)
+def test_damaged_files_are_rejected(tmp_path: Path) -> None:
+    file = tmp_path / "roadmap.npz"
+    grow(iterations=200).save(file)
     header, arrays = read_archive(file, "groundmap roadmap", 1)
     for change in (
         {"edges": arrays["edges"] + len(arrays["vertices"])},
@@ -333,7 +338,7 @@ def test_damaged_files_are_refused(tmp_path: Path) -> None:
         {"vertices": arrays["vertices"][:, :1]},
     ):
         write_archive(file, header, arrays | change)
-        with pytest.raises(FileFormatError, match="a whole roadmap, got arrays that don't fit"):
+        with pytest.raises(FileFormatError, match="a complete roadmap, got arrays that are not"):
             Roadmap.load(file, problem())
     wrong: list[dict[str, Any]] = [
         {"settings": {"space": "r5"}},
@@ -345,11 +350,11 @@ def test_damaged_files_are_refused(tmp_path: Path) -> None:
     ]
     for changed in wrong:
         write_archive(file, header | changed, arrays)
-        with pytest.raises(FileFormatError, match="a whole roadmap, got one that lacks something"):
+        with pytest.raises(FileFormatError, match="a complete roadmap, got one with missing"):
             Roadmap.load(file, problem())
     del arrays["weights"]
     write_archive(file, header, arrays)
-    with pytest.raises(FileFormatError, match="one that lacks something"):
+    with pytest.raises(FileFormatError, match="one with missing or invalid parts"):
         Roadmap.load(file, problem())
     write_archive(file, header | {"version": 2}, arrays)
     with pytest.raises(FileFormatError, match="version 1 or older, got version 2"):
@@ -358,7 +363,7 @@ def test_damaged_files_are_refused(tmp_path: Path) -> None:
         Roadmap.load(tmp_path / "none.npz", problem())
 
 
-def test_edges_that_are_not_clear_are_never_taken() -> None:
+def test_blocked_edges_are_not_used() -> None:
     asked = problem(grid=grid_of(np.where(rooms(), BLOCKED, FREE), resolution=0.25))
     broken = _by_hand(asked, [(3, 5), (3, 9), (9, 5), (9, 9)], [(0, 2), (0, 1), (1, 3), (2, 3)])
     for _ in range(2):
@@ -372,20 +377,20 @@ def _by_hand(
 ) -> Roadmap:
     places, joined = np.array(vertices, dtype=np.float64), np.array(edges)
     weights = np.hypot(*(places[joined[:, 0]] - places[joined[:, 1]]).T)
-    validator = MotionValidator(Costmap.of(asked), "r2", 1.0)
+    validator = MotionValidator2D(Costmap.of(asked), "r2", 1.0)
     return Roadmap(validator, Graph(places, joined, weights), SamplingSettings(space="r2"))
 
 
 @needs_ompl
-def test_what_can_not_be_grown_is_refused() -> None:
+def test_invalid_growth_is_rejected() -> None:
     problems: list[tuple[dict[str, Any], str]] = [
         ({"planner": "rrt"}, r"planner: expected 'prm' or 'prmstar', got 'rrt'"),
         ({"space": "dubins"}, r"one that works in 'dubins', got prm\. .* backwards"),
         ({"space": "r3"}, r"one that works in 'r3', got prm"),
     ]
-    for told, match in problems:
+    for options, match in problems:
         with pytest.raises(ProblemError, match=match):
-            Roadmap.grow(problem(), **told)
+            Roadmap.grow(problem(), **options)
     with pytest.raises(ProblemError, match=r"start: expected x, y \[m\] and yaw \[rad\] in se2"):
         Roadmap.grow(problem(start=(2, 2)), space="se2")
     wrong: list[tuple[dict[str, Any], str]] = [
@@ -394,9 +399,9 @@ def test_what_can_not_be_grown_is_refused() -> None:
         ({"no_such": 1}, "no_such: expected a setting of SamplingSettings"),
         ({"planner": "prmstar", "max_nearest_neighbors": 5}, "expected none for 'prmstar'"),
     ]
-    for told, match in wrong:
+    for options, match in wrong:
         with pytest.raises(SettingsError, match=match):
-            Roadmap.grow(problem(), **told)
+            Roadmap.grow(problem(), **options)
     with pytest.raises(NonFreeError, match=r"start \(6.00, 6.00\)"):
         Roadmap.grow(problem(start=(6, 6)))
     with pytest.raises(OutsideMapError, match=r"start \(60.00, 6.00\)"):
@@ -414,16 +419,16 @@ def test_growth_can_be_interrupted_and_cancelled() -> None:
     with pytest.raises(KeyboardInterrupt, match=r"^$"):
         Roadmap.grow(problem(), seconds=20)
     timer.join()
-    enough = threading.Event()
-    timer = threading.Timer(0.3, enough.set)
+    cancel = threading.Event()
+    timer = threading.Timer(0.3, cancel.set)
     timer.start()
-    roadmap = Roadmap.grow(problem(), seconds=20, cancel=enough)
+    roadmap = Roadmap.grow(problem(), seconds=20, cancel=cancel)
     timer.join()
     assert roadmap.plan((2, 2), (10, 9.5)).audit == "clean"
 
 
 @needs_ompl
-def test_roadmaps_that_grow_at_once_take_turns_and_lose_no_time() -> None:
+def test_roadmaps_grown_in_threads_each_get_their_time() -> None:
     done: list[int] = []
 
     def grow(seed: int) -> None:
@@ -439,11 +444,11 @@ def test_roadmaps_that_grow_at_once_take_turns_and_lose_no_time() -> None:
 
 
 @needs_ompl
-def test_growth_that_was_cancelled_before_is_none() -> None:
-    enough = threading.Event()
-    enough.set()
+def test_growth_that_is_cancelled_before_raises_an_error() -> None:
+    cancel = threading.Event()
+    cancel.set()
     with pytest.raises(CancelledError, match=r"prm: cancelled after 0\.\d+ s"):
-        Roadmap.grow(problem(), cancel=enough)
+        Roadmap.grow(problem(), cancel=cancel)
 
 
 SCRIPT = """

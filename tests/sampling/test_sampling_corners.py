@@ -32,7 +32,7 @@ from planners.bench.worker_pool import _receive, _Worker
 from planners.costmap.costmap import Costmap
 from planners.route.solve import solve
 from planners.sampling import threaded_solve
-from planners.sampling.motion_validator import MotionValidator
+from planners.sampling.motion_validator2d import MotionValidator2D
 from planners.sampling.roadmap import Roadmap
 from planners.sampling.settings import SamplingSettings, StateSpace
 from planners.search.base import SearchResult
@@ -48,8 +48,8 @@ def walled() -> Any:
 
 
 def asked(**values: Any) -> PlanningProblem:
-    told: dict[str, Any] = {"start": (2, 2, 0), "goal": (14, 2, 0), "footprint": 0.5}
-    return PlanningProblem(walled(), **(told | values), clear_start=False)
+    options: dict[str, Any] = {"start": (2, 2, 0), "goal": (14, 2, 0), "footprint": 0.5}
+    return PlanningProblem(walled(), **(options | values), clear_start=False)
 
 
 def needle() -> PlanningProblem:
@@ -60,7 +60,7 @@ def needle() -> PlanningProblem:
     return PlanningProblem(grid_of(z, resolution=0.25), **ends, clear_start=False)
 
 
-def test_a_goal_that_reaches_into_another_room_still_ends_in_this_one() -> None:
+def test_a_goal_radius_across_a_wall_selects_a_reachable_goal() -> None:
     z = free_field(80, 80)
     z[:, 19:21] = BLOCKED
     ends: dict[str, Any] = {"start": (1.0, 15), "goal": (11, 10), "footprint": 0.3}
@@ -71,12 +71,12 @@ def test_a_goal_that_reaches_into_another_room_still_ends_in_this_one() -> None:
         assert math.dist(route.waypoints[-1], (11, 10)) <= 6.9 + 1e-9
 
 
-@pytest.mark.parametrize("told", [{"goals": ((14, 10, 1.0),)}, {"goal_radius": 1.0}])
-def test_a_route_ends_at_a_goal_that_will_do(told: dict[str, Any]) -> None:
+@pytest.mark.parametrize("options", [{"goals": ((14, 10, 1.0),)}, {"goal_radius": 1.0}])
+def test_a_route_ends_at_an_accepted_goal(options: dict[str, Any]) -> None:
     problem = asked(footprint=CAR)
-    route = plan(problem, "rrtconnect", space="se2", goal_yaw_tolerance=0.3, **told)
+    route = plan(problem, "rrtconnect", space="se2", goal_yaw_tolerance=0.3, **options)
     end = (*route.waypoints[-1].tolist(), float(route.headings[-1]))
-    assert SamplingSettings(goal_yaw_tolerance=0.3, **told).will_do(end, (14, 2, 0), axes=2)
+    assert SamplingSettings(goal_yaw_tolerance=0.3, **options).will_do(end, (14, 2, 0), axes=2)
 
 
 def test_a_route_that_ends_at_no_goal_is_caught() -> None:
@@ -86,14 +86,14 @@ def test_a_route_that_ends_at_no_goal_is_caught() -> None:
         def search(self, start: Any, goal: Any, settings: Any) -> SearchResult:
             return SearchResult(np.array([(2.0, 2.0), (5.0, 2.0)]), 1, goal=(5.0, 2.0))
 
-    told = SamplingSettings(goal_radius=1.0)
+    options = SamplingSettings(goal_radius=1.0)
     with pytest.raises(AuditError, match=r"ends at no goal at \(5.00, 2.00\)"):
-        solve(Costmap.of(asked()), Liar(), told, began=0.0)
+        solve(Costmap.of(asked()), Liar(), options, began=0.0)
 
 
 @pytest.mark.parametrize("name", ["rrtconnect", "rrtstar", "prm"])
 @pytest.mark.parametrize("kind", [RuntimeError, NotImplementedError])
-def test_even_a_runtime_error_of_who_is_told_comes_through(name: str, kind: type) -> None:
+def test_a_runtime_error_of_the_callback_is_raised(name: str, kind: type) -> None:
     def fail(_: Any) -> None:
         raise kind("mine")
 
@@ -101,7 +101,7 @@ def test_even_a_runtime_error_of_who_is_told_comes_through(name: str, kind: type
         plan(asked(), name, on_improved=fail)
 
 
-def test_a_warm_start_that_is_cancelled_hands_out_what_it_began_with() -> None:
+def test_a_cancelled_warm_start_returns_its_first_route() -> None:
     cancel = threading.Event()
     route = plan(
         asked(), "rrtstar", warm_start=True, cancel=cancel, on_improved=lambda _: cancel.set()
@@ -110,22 +110,24 @@ def test_a_warm_start_that_is_cancelled_hands_out_what_it_began_with() -> None:
 
 
 @pytest.mark.parametrize("name", ["rrtconnect", "rrtstar", "fmt", "prm"])
-def test_a_warm_start_goes_on_for_improve_for_and_no_longer(name: str) -> None:
-    # With neither a limit nor a better route to find, nothing else would end it.
+def test_a_warm_start_ends_after_improve_for(name: str) -> None:
+    # Without a time limit and a better route, only improve_for ends it.
     route = plan(needle(), name, warm_start=True, improve_for=0.1, time_limit=None)
     assert route.audit == "clean"
 
 
 @pytest.mark.parametrize("space", ["se2", "dubins", "reeds_shepp"])
-def test_a_warm_start_needs_no_yaw_where_any_will_do(space: str) -> None:
+def test_a_warm_start_needs_no_yaw_with_a_full_yaw_tolerance(space: str) -> None:
     problem = asked(footprint=CAR, goal=(14, 2))
-    told: dict[str, Any] = {"goal_yaw_tolerance": math.pi, "iterations": 200}
-    assert plan(problem, "rrtstar", space=space, warm_start=True, **told).audit == "clean"
-    [route] = plan_many(problem, [((2, 2, 0), (14, 2))], "rrtstar", space=space, **told)
+    options: dict[str, Any] = {"goal_yaw_tolerance": math.pi, "iterations": 200}
+    assert plan(problem, "rrtstar", space=space, warm_start=True, **options).audit == "clean"
+    [route] = plan_many(problem, [((2, 2, 0), (14, 2))], "rrtstar", space=space, **options)
     assert isinstance(route, Route)
 
 
-def test_slices_that_are_too_short_take_back_no_route(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_slice_too_short_for_a_solution_does_not_lose_the_route(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(threaded_solve, "SLICE", 0.0005)
     for seed in range(5):
         assert plan(asked(), "prmstar", seed=seed, improve_for=0.1).audit == "clean"
@@ -134,8 +136,8 @@ def test_slices_that_are_too_short_take_back_no_route(monkeypatch: pytest.Monkey
 @pytest.mark.parametrize(
     "again", [copy.deepcopy, lambda validator: pickle.loads(pickle.dumps(validator))]
 )
-def test_a_copy_of_ways_reads_arrays_of_its_own(again: Any) -> None:
-    validator = MotionValidator(Costmap.of(asked(footprint=CAR)), "se2", 1.0)
+def test_a_copied_validator_reads_its_own_arrays(again: Any) -> None:
+    validator = MotionValidator2D(Costmap.of(asked(footprint=CAR)), "se2", 1.0)
     before, twin = validator.is_clear.args[0], again(validator)  # type: ignore[attr-defined]
     assert twin.is_clear.args[0] != before
     del validator
@@ -145,30 +147,30 @@ def test_a_copy_of_ways_reads_arrays_of_its_own(again: Any) -> None:
 
 @pytest.mark.parametrize("again", [copy.deepcopy, pickle.dumps])
 @pytest.mark.parametrize("space", ["r2", "se2", "dubins", "reeds_shepp"])
-def test_a_check_of_edges_is_neither_copied_nor_pickled(space: StateSpace, again: Any) -> None:
-    validator = MotionValidator(Costmap.of(asked(footprint=CAR)), space, 1.0)
-    with pytest.raises(TypeError, match=r"is_clear can't be copied or pickled.* its Ways instead"):
+def test_a_check_of_edges_can_not_be_copied_or_pickled(space: StateSpace, again: Any) -> None:
+    validator = MotionValidator2D(Costmap.of(asked(footprint=CAR)), space, 1.0)
+    with pytest.raises(TypeError, match=r"is_clear can't be copied or pickled.* its MotionV"):
         again(validator.is_clear)
 
 
 def test_a_shallow_copy_of_a_check_keeps_its_arrays() -> None:
-    validator = MotionValidator(Costmap.of(asked(footprint=CAR)), "se2", 1.0)
+    validator = MotionValidator2D(Costmap.of(asked(footprint=CAR)), "se2", 1.0)
     twin = copy.copy(validator.is_clear)
-    assert vars(twin)["kept"] is vars(validator.is_clear)["kept"]
+    assert vars(twin)["owner"] is vars(validator.is_clear)["owner"]
 
 
-def test_a_roadmap_that_weighs_nothing_is_refused_before_it_grows() -> None:
+def test_a_roadmap_with_zero_weights_is_rejected_before_growth() -> None:
     with pytest.raises(SettingsError, match="length_weight: expected more than 0"):
         Roadmap.grow(asked(), seconds=1e9, length_weight=0)
 
 
-def halved(number: Any) -> Any:
+def halve(number: Any) -> Any:
     return number / 2.0
 
 
-def test_who_ends_before_it_reads_its_task_loses_that_task() -> None:
+def test_a_worker_that_dies_before_it_reads_its_task_loses_that_task() -> None:
     for given_first in (True, False):
-        worker = _Worker(halved)
+        worker = _Worker(halve)
         if given_first:
             worker.send(3, 60.0)
         worker.process.kill()
@@ -180,13 +182,13 @@ def test_who_ends_before_it_reads_its_task_loses_that_task() -> None:
         worker.kill()
 
 
-def test_a_route_of_no_length_has_no_ratio() -> None:
+def test_a_route_of_zero_length_has_no_ratio() -> None:
     race = Race("one place", "r2", "rrt", [Attempt(0.1, ((0.05, 0.0),))])
     one = row(race, Optimum(0.0, is_best_known=False))
     assert (one["ratio"], one["curve"], one["solved"]) == (None, [], 1)
 
 
-def test_maps_of_one_name_are_told_apart(tmp_path: Path) -> None:
+def test_maps_of_the_same_name_are_distinguished(tmp_path: Path) -> None:
     options: list[Any] = []
     for folder, width in (("a", 40), ("b", 20)):
         (tmp_path / folder).mkdir()
@@ -200,42 +202,42 @@ def test_maps_of_one_name_are_told_apart(tmp_path: Path) -> None:
     assert len({one["workload"] for one in ran.json["rows"]}) == 2
 
 
-def test_options_of_the_other_bench_are_refused() -> None:
+def test_options_of_the_other_benchmark_are_rejected() -> None:
     ran = groundmap("bench", "planning", "--movingai", "maps", "--space", "r2")
     assert (ran.code, "--space: expected it with --samplers" in ran.err) == (2, True)
     ran = groundmap("bench", "planning", "--samplers", "--limit", "3")
     assert (ran.code, "--limit: expected it with --movingai" in ran.err) == (2, True)
 
 
-def test_who_is_at_a_goal_stays_there() -> None:
+def test_a_start_within_the_goal_radius_gives_a_route_of_zero_length() -> None:
     z = np.full((64, 64), FREE, dtype=np.float32)
     shifted = grid_of(z, resolution=0.1524, origin=(-7.3, 2.9))
     ends: dict[str, Any] = {"start": (-3.1, 5.7), "goal": (1.1, 6.3), "footprint": 0.3}
     problem = PlanningProblem(shifted, **ends, clear_start=False)
     assert plan(problem, "rrtconnect", goal_radius=5).waypoints.tolist() == [[-3.1, 5.7]] * 2
-    for told in ({"goal_radius": 30.0}, {"goals": [[2, 2, 0]]}):
-        assert plan(asked(), "rrtconnect", **told).length == 0.0
+    for options in ({"goal_radius": 30.0}, {"goals": [[2, 2, 0]]}):
+        assert plan(asked(), "rrtconnect", **options).length == 0.0
 
 
-def test_a_goal_beyond_the_map_is_none_if_others_will_do() -> None:
+def test_a_goal_off_the_map_is_ignored_if_another_goal_is_accepted() -> None:
     route = plan(asked(goal=(500, 2)), "rrtconnect", goals=[[14, 2]])
     assert route.waypoints[-1].tolist() == [14.0, 2.0]
     with pytest.raises(OutsideMapError, match=r"^goal \(500.00, 2.00\) is outside the map"):
         plan(asked(goal=(500, 2)), "rrtconnect", goals=[[600, 2]])
 
 
-def test_goals_are_places() -> None:
+def test_goals_that_are_no_list_of_places_are_rejected() -> None:
     for wrong in ((3, 4), "3,4", 7):
         with pytest.raises(SettingsError, match=r"goals: expected a list of places, such as"):
             plan(asked(), "rrtconnect", goals=wrong)
 
 
-def test_a_warm_start_is_pulled_tight() -> None:
+def test_the_first_route_of_a_warm_start_is_simplified() -> None:
     route = plan(asked(), "rrtconnect", warm_start=True, iterations=1)
     assert route.length < plan(asked(), "astar").length - 0.1
 
 
-def test_a_roadmap_says_that_its_map_has_changed() -> None:
+def test_a_roadmap_reports_that_its_map_has_changed() -> None:
     problem = asked()
     roadmap = Roadmap.grow(problem, iterations=300, seconds=30)
     z = np.full((64, 64), FREE, dtype=np.float32)
@@ -246,14 +248,14 @@ def test_a_roadmap_says_that_its_map_has_changed() -> None:
         roadmap.plan((2, 2), (14, 2))
 
 
-def test_the_threads_of_many_plans_wait_without_loss() -> None:
+def test_time_spent_waiting_for_other_searches_does_not_count() -> None:
     pairs = [((2, 2), (14, y)) for y in (2, 4, 6, 8)]
     found = plan_many(asked(), pairs, "rrtstar", threads=4, improve_for=0.2, time_limit=None)
     assert all(isinstance(route, Route) for route in found)
 
 
-def test_ctrl_c_ends_many_plans() -> None:
-    # The signal itself: `interrupt_main` would not wake a main thread that waits for others.
+def test_ctrl_c_ends_plan_many() -> None:
+    # A real signal: `interrupt_main` would not wake a main thread that waits for others.
     main = threading.main_thread().ident
     assert main is not None
     timer = threading.Timer(0.5, signal.pthread_kill, (main, signal.SIGINT))

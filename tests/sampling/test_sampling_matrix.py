@@ -1,7 +1,6 @@
-"""Whatever a sampling planner is told, it ends in a route or in an error of ours.
+"""With any settings, a sampling planner ends with a route or one of our errors.
 
-Each planner is tried in a process of its own, as OMPL may end it: run as a script, this file is
-that process.
+Each planner runs in a process of its own, as OMPL may crash it: this file, run as a script.
 """
 
 from __future__ import annotations
@@ -21,14 +20,15 @@ from groundmap.errors import SettingsError
 from oracles_planning import BLOCKED, FREE, free_field, grid_of
 from planners import NoRouteError, PlanningProblem, ProblemError, SamplingSettings, plan
 from planners.sampling.ompl_module import has_parameter, samplers
+from planners.sampling.ompl_parameters import PARAMETERS
 from planners.sampling.ompl_search import THREADED
-from planners.sampling.settings import PARAMETERS, REFUSED, StateSpace, refusal
+from planners.sampling.settings import REFUSED, StateSpace, refusal
 
 NAMES = [name for name in sorted(samplers()) if (name, None) not in REFUSED]
 SPACES: tuple[StateSpace, ...] = tuple(space for space in get_args(StateSpace) if space != "r3")
 CAR = [(-0.3, -0.2), (0.5, -0.2), (0.5, 0.2), (-0.3, 0.2)]
-PATIENCE = 240.0  # [s] for all that one planner is asked, which takes some seconds
-MEMORY = 4 * 2**30  # [bytes] that it may ask for
+PATIENCE = 240.0  # [s] for all cases of one planner, which take some seconds
+MEMORY = 4 * 2**30  # [bytes] limit of its address space
 BRIEF: dict[str, Any] = {"time_limit": 0.05, "improve_for": 0.01}
 needs_ompl = pytest.mark.skipif(not NAMES, reason="ompl is not installed")
 
@@ -82,7 +82,7 @@ SHAPED: dict[StateSpace, dict[str, list[Any]]] = {
 
 
 def ends_of(name: str) -> list[Any]:
-    """Return the least and the greatest that a parameter may be."""
+    """Return the least and the greatest value of a parameter."""
     field = SamplingSettings.model_fields[name]
     bounds = {
         key: getattr(rule, key)
@@ -93,8 +93,8 @@ def ends_of(name: str) -> list[Any]:
     return [bounds.get("ge", 5e-324), bounds.get("le", 1e300)] if bounds else [False, True]
 
 
-def told_to(name: str, space: StateSpace) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the maps and the settings that a planner is tried with in a space."""
+def cases_of(name: str, space: StateSpace) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield maps and settings to try a planner with in a space."""
     yield from ((place, {}) for place in MAPS)
     for key, values in (COMMON | SHAPED[space]).items():
         if key == "iterations" and name in THREADED:
@@ -111,8 +111,8 @@ def told_to(name: str, space: StateSpace) -> Iterator[tuple[str, dict[str, Any]]
         yield "doorway", {key: ends_of(key)[0] for key in own}
 
 
-def tried(name: str, space: StateSpace, place: str, told: dict[str, Any]) -> str:
-    """Plan, and return how that ended."""
+def try_plan(name: str, space: StateSpace, place: str, options: dict[str, Any]) -> str:
+    """Plan, and return the outcome."""
     z, start, goal = MAPS[place]
     problem = PlanningProblem(
         grid_of(z, resolution=0.25),
@@ -122,13 +122,13 @@ def tried(name: str, space: StateSpace, place: str, told: dict[str, Any]) -> str
         clear_start=False,
     )
     try:
-        return f"{plan(problem, name, space=space, **(BRIEF | told)).length:.1f} m"
+        return f"{plan(problem, name, space=space, **(BRIEF | options)).length:.1f} m"
     except (NoRouteError, ProblemError, SettingsError) as error:
         return type(error).__name__
 
 
-def interrupted(name: str) -> str:
-    """Break a search off at many moments, then plan."""
+def interrupt_often(name: str) -> str:
+    """Interrupt a search at many moments, then plan."""
 
     def alarm(*_: Any) -> None:
         raise KeyboardInterrupt
@@ -138,27 +138,27 @@ def interrupted(name: str) -> str:
     for moment in np.linspace(0.001, 0.05, 12):
         try:
             signal.setitimer(signal.ITIMER_REAL, moment)
-            tried(name, "r2", "needle", {"time_limit": 1.0, "improve_for": 1.0})
+            try_plan(name, "r2", "needle", {"time_limit": 1.0, "improve_for": 1.0})
         except KeyboardInterrupt:
             caught += 1
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
-    return f"{caught} times, then {tried(name, 'r2', 'open', {})}"
+    return f"{caught} times, then {try_plan(name, 'r2', 'open', {})}"
 
 
 def try_all(name: str) -> None:
     """Print a line for each combination, before it and after it."""
     for space in SPACES:
         if refusal(name, space) is None:
-            for place, told in told_to(name, space):
-                print(space, place, told, end=": ", flush=True)
-                print(tried(name, space, place, told), flush=True)
-    print("interrupted:", interrupted(name), flush=True)
+            for place, options in cases_of(name, space):
+                print(space, place, options, end=": ", flush=True)
+                print(try_plan(name, space, place, options), flush=True)
+    print("interrupted:", interrupt_often(name), flush=True)
     print("the end")
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_whatever_is_asked_ends_in_a_route_or_an_error_of_ours(name: str) -> None:
+def test_every_case_ends_with_a_route_or_one_of_our_errors(name: str) -> None:
     try:
         ran = subprocess.run(
             [sys.executable, __file__, name],
@@ -170,11 +170,11 @@ def test_whatever_is_asked_ends_in_a_route_or_an_error_of_ours(name: str) -> Non
         )
     except subprocess.TimeoutExpired as error:
         pytest.fail(f"{name} hangs: {bytes(error.stdout or b'').decode()[-200:]}")
-    said = ran.stdout.splitlines()
-    assert ran.returncode == 0, f"{said[-1:]} {ran.stderr[-2000:]}"
+    lines = ran.stdout.splitlines()
+    assert ran.returncode == 0, f"{lines[-1:]} {ran.stderr[-2000:]}"
     assert ran.stderr == ""
-    assert said[-1] == "the end"
-    assert sum(" m" in line for line in said) > len(MAPS)
+    assert lines[-1] == "the end"
+    assert sum(" m" in line for line in lines) > len(MAPS)
 
 
 @pytest.mark.parametrize(
@@ -182,7 +182,7 @@ def test_whatever_is_asked_ends_in_a_route_or_an_error_of_ours(name: str) -> Non
     [(name, space) for name, one in REFUSED for space in ([one] if one else SPACES)],
 )
 @needs_ompl
-def test_what_is_refused_is_refused_with_its_reason(name: str, space: StateSpace) -> None:
+def test_unsupported_spaces_are_rejected_with_a_reason(name: str, space: StateSpace) -> None:
     z, start, goal = MAPS["doorway"]
     problem = PlanningProblem(grid_of(z, resolution=0.25), start=start, goal=goal, footprint=0.5)
     with pytest.raises(ProblemError, match=rf"one that works in '{space}', got {name}\.") as caught:
@@ -192,10 +192,10 @@ def test_what_is_refused_is_refused_with_its_reason(name: str, space: StateSpace
 
 @pytest.mark.parametrize("name", [name for name in PARAMETERS if ends_of(name)[0] is not False])
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf"), -1])
-def test_numbers_that_are_none_are_no_parameters(name: str, value: float) -> None:
-    told: dict[str, Any] = {name: value}
+def test_invalid_numbers_are_rejected_as_parameters(name: str, value: float) -> None:
+    options: dict[str, Any] = {name: value}
     with pytest.raises(SettingsError, match=rf"^{name}: expected "):
-        SamplingSettings(**told)
+        SamplingSettings(**options)
 
 
 if __name__ == "__main__":

@@ -42,15 +42,15 @@ def problem(grid: ConfidenceGrid, **values: Any) -> PlanningProblem:
     return PlanningProblem(grid, **(asked | values))
 
 
-def told(name: str, **settings: Any) -> dict[str, Any]:
+def short_run(name: str, **settings: Any) -> dict[str, Any]:
     if name in THREADED:
         return settings | {"improve_for": 0.1}
     return settings | {"iterations": 2000 if name in STARS else 100_000}
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_planner_finds_its_way_through_holes_in_walls(name: str) -> None:
-    route = plan(problem(rooms()), name, **told(name))
+def test_every_planner_finds_a_route_through_holes_in_walls(name: str) -> None:
+    route = plan(problem(rooms()), name, **short_run(name))
     assert (route.audit, route.planner, route.bound) == ("clean", name, None)
     assert route.waypoints[[0, -1]].tolist() == [[1.0, 3.0, 1.0], [11.0, 1.0, 3.0]]
     assert route.headings[-1] == 0.5
@@ -59,29 +59,31 @@ def test_every_planner_finds_its_way_through_holes_in_walls(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", COUNTED)
-def test_a_seed_repeats_its_route_exactly_and_another_brings_another(name: str) -> None:
-    first, again, other = (plan(problem(rooms()), name, **told(name, seed=s)) for s in (3, 3, 4))
+def test_equal_seeds_repeat_the_route_and_other_seeds_do_not(name: str) -> None:
+    first, again, other = (
+        plan(problem(rooms()), name, **short_run(name, seed=s)) for s in (3, 3, 4)
+    )
     np.testing.assert_array_equal(again.waypoints, first.waypoints)
     assert again.expanded == first.expanded
     assert other.expanded != first.expanded
 
 
 @needs_ompl
-def test_walls_without_holes_are_proved_to_enclose_at_once() -> None:
+def test_walls_without_holes_enclose_without_a_search() -> None:
     with pytest.raises(EnclosedError, match="enclosed"):
         plan(problem(rooms(holes=False)), "rrtconnect", time_limit=None)
 
 
 @pytest.mark.parametrize("space", ["r2", "se2", "dubins", "reeds_shepp"])
 @needs_ompl
-def test_spaces_of_the_plane_are_refused_on_3d_maps(space: str) -> None:
+def test_2d_spaces_are_rejected_on_3d_maps(space: str) -> None:
     with pytest.raises(ProblemError, match=rf"space: expected 'r3', on a 3-D map, got '{space}'"):
         plan(problem(rooms()), "rrtconnect", space=space)
     assert plan(problem(rooms()), "rrtconnect", space="r3", iterations=100_000).audit == "clean"
 
 
 @needs_ompl
-def test_r3_is_refused_on_2d_maps() -> None:
+def test_r3_is_rejected_on_2d_maps() -> None:
     flat = PlanningProblem(grid_of(free_field(16, 16)), start=(2, 2), goal=(9, 9), footprint=0.5)
     with pytest.raises(ProblemError, match=r"space: expected .* on a 2-D map, got 'r3'"):
         plan(flat, "rrtconnect", space="r3")

@@ -12,7 +12,7 @@ from numba import njit
 from oracles_planning import free_field, grid_of
 from planners import OWN_PLANNERS, PlanningProblem, TimeLimitError, plan
 from planners.costmap.costmap import Costmap
-from planners.sampling.ompl_states import OFTEN, SOON, Glance
+from planners.sampling.ompl_states import MAX_CALLS, POLL_INTERVAL, PollSchedule
 from planners.search.base import Clock, now
 from planners.search.kernels.compiling import compiled_for
 
@@ -60,15 +60,15 @@ def test_the_time_limit_counts_from_the_call(planner: str, monkeypatch: pytest.M
     assert plan(asked, planner, time_limit=6.0).audit == "clean"
 
 
-@pytest.mark.parametrize(("slow", "calls_between"), [(10.0 * SOON, 1), (0.0, OFTEN)])
-def test_the_slower_the_calls_the_fewer_are_between_two_looks(
+@pytest.mark.parametrize(("slow", "calls_between"), [(10.0 * POLL_INTERVAL, 1), (0.0, MAX_CALLS)])
+def test_slower_calls_are_fewer_between_two_polls(
     slow: float, calls_between: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    moments, looks = [0.0], []
+    moments, polls = [0.0], []
     monkeypatch.setattr("planners.sampling.ompl_states.time.perf_counter", lambda: moments[0])
-    glance = Glance(lambda: looks.append(glance.due - glance.step))
+    schedule = PollSchedule(lambda: polls.append(schedule.due - schedule.step))
     for call in range(1, 5000):
         moments[0] += slow
-        if call >= glance.due:
-            glance(call)
-    assert looks[-1] - looks[-2] == calls_between
+        if call >= schedule.due:
+            schedule(call)
+    assert polls[-1] - polls[-2] == calls_between

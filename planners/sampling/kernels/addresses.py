@@ -1,7 +1,7 @@
-"""Arrays that a kernel finds by one address: a call from Python then unpacks one number.
+"""Access to arrays through the address of a table, so that a call from Python unpacks one number.
 
-To unpack an array takes longer than to check a short line. So what many calls share is listed in
-a table, once, and each call is told where the table is. Whoever keeps the table keeps the arrays.
+Unpacking an array takes longer than checking a short line. The table lists, once, the arrays that
+many calls share, and each call passes its address. The owner of the table must own the arrays.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from numba.np.numpy_support import carray
 
 from groundmap.arrays import Bools, Floats, Ints
 
-WORDS = 3  # of the table per array: its address, rows and columns; one column if it has one axis
+WORDS = 3  # per array: its address, rows and columns (1 for an array of one axis)
 
 
 def _to_pointer(_: Any, __: Any) -> Any:
-    """Tell numba how an address becomes a pointer."""
+    """Define for numba the conversion of an address to a pointer."""
 
     def build(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         return builder.inttoptr(values[0], context.get_value_type(signature.return_type))
@@ -32,7 +32,15 @@ _pointer: Any = intrinsic(_to_pointer)
 
 @njit(cache=True)
 def bools_at(table: int, k: int) -> Bools:
-    """Return the table's array k, which holds truth values, shape (rows, columns)."""
+    """Return an array of bool, shape (rows, columns).
+
+    Parameters
+    ----------
+    table : int
+        Address of the table.
+    k : int
+        Number of the array.
+    """
     words = _words(table, k)
     view: Bools = carray(_pointer(words[0]), (words[1], words[2]), np.bool_)
     return view
@@ -40,7 +48,15 @@ def bools_at(table: int, k: int) -> Bools:
 
 @njit(cache=True)
 def ints_at(table: int, k: int) -> Ints:
-    """Return the table's array k, which holds int64, shape (rows, columns)."""
+    """Return an array of int64, shape (rows, columns).
+
+    Parameters
+    ----------
+    table : int
+        Address of the table.
+    k : int
+        Number of the array.
+    """
     words = _words(table, k)
     view: Ints = carray(_pointer(words[0]), (words[1], words[2]), np.int64)
     return view
@@ -48,7 +64,15 @@ def ints_at(table: int, k: int) -> Ints:
 
 @njit(cache=True)
 def floats_at(table: int, k: int) -> Floats:
-    """Return the table's array k, which holds float64, shape (rows, columns)."""
+    """Return an array of float64, shape (rows, columns).
+
+    Parameters
+    ----------
+    table : int
+        Address of the table.
+    k : int
+        Number of the array.
+    """
     words = _words(table, k)
     view: Floats = carray(_pointer(words[0]), (words[1], words[2]), np.float64)
     return view

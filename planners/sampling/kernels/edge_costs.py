@@ -1,8 +1,8 @@
-"""What the edges between sampled states cost: their length, the cells they cross, and their time.
+"""Costs of edges between sampled states: their length, the cells they cross, and their duration.
 
-Places come in metres from the map's outer corner, as the sampler holds them. A straight line is cut
-at the borders of the cells, so what its cells cost is exact. A curve is cut into the chords between
-the poses of the route, and the cells count that the chords cross.
+Positions are in metres from the map's outer corner, as in OMPL's states. A straight line is cut at
+the borders of the cells, so the cost of its cells is exact. A curve is cut into the chords between
+the poses of the route, and costs what the cells that the chords cross cost.
 """
 
 from __future__ import annotations
@@ -14,24 +14,19 @@ from numba import njit
 
 from groundmap.arrays import Bytes, Floats
 from planners.geometry.kernels.curves import SEGMENTS, along, wrap
-from planners.geometry.kernels.swept_footprint import Shape, cuts
+from planners.geometry.kernels.swept_footprint import cuts
 from planners.route.kernels.shortcut import leg_cost
 from planners.sampling.kernels.edges import (
-    ARM,
-    BULGE,
-    INSCRIBED,
-    RADIUS,
     SIZE,
-    SPIKE,
-    TOUCH,
     TURNING,
     comes_later,
     curve_motions,
     curve_word,
+    to_shape,
 )
 
-# What `prices` holds: of a cell's side, of a cell's side per unit of its cost, of the time in which
-# a cell's side is driven at full speed, and of that in which a radian is turned.
+# Positions in `prices`: cost of the length of a cell's side, the same per unit of the cell's cost,
+# and costs of the time to drive a cell's side and to turn by a radian at full speed.
 LENGTH, COST, DRIVE, TURN = range(4)
 
 
@@ -39,16 +34,17 @@ LENGTH, COST, DRIVE, TURN = range(4)
 def line_cost(
     costs: Bytes, numbers: Floats, prices: Floats, ax: float, ay: float, bx: float, by: float
 ) -> float:
-    """Return what the straight line from a to b costs.
+    """Return the cost of the straight line from a to b.
 
     Parameters
     ----------
     costs : ndarray of uint8, shape (rows, cols)
-        Of cells, 252 at most.
+        Of cells, at most 252.
     numbers : ndarray, shape (8,)
         As in `Body`.
     prices : ndarray, shape (4,)
-    ax, ay, bx, by : float [m]
+    ax, ay, bx, by : float [m, corner]
+        Start and end of the line.
     """
     size = numbers[SIZE]
     ax, ay, bx, by = ax / size, ay / size, bx / size, by / size
@@ -70,15 +66,16 @@ def slide_cost(
     by: float,
     b: float,
 ) -> float:
-    """Return what it costs to move straight from a to b, and to turn meanwhile.
+    """Return the cost of a straight motion from a to b with a simultaneous turn.
 
-    Driving and turning end at once: the slower of the two tells how long that takes.
+    Its duration is that of the slower one, driving or turning.
 
     Parameters
     ----------
-    costs, numbers, prices
+    costs, numbers, prices : ndarray
         As for `line_cost`.
-    ax, ay, a, bx, by, b : float [m, rad]
+    ax, ay, a, bx, by, b : float [m, m, rad, m, m, rad; corner]
+        First and last pose.
     """
     size = numbers[SIZE]
     ax, ay, bx, by = ax / size, ay / size, bx / size, by / size
@@ -103,20 +100,23 @@ def curve_cost(
     by: float,
     b: float,
 ) -> float:
-    """Return what the shortest curve from a to b costs.
+    """Return the cost of the shortest curve from a to b.
 
     Parameters
     ----------
     forward : bool
-        Dubins' curve; otherwise that of Reeds and Shepp, which costs the same both ways.
-    costs, numbers, prices
+        Whether the curve is a Dubins curve; else a Reeds-Shepp curve, which costs the same in both
+        directions.
+    costs, numbers, prices : ndarray
         As for `line_cost`.
-    ax, ay, a, bx, by, b : float [m, rad]
+    ax, ay, a, bx, by, b : float [m, m, rad, m, m, rad; corner]
+        First and last pose.
     """
     if not forward and comes_later(ax, ay, a, bx, by, b):
         ax, ay, a, bx, by, b = bx, by, b, ax, ay, a
     curvatures, lengths = curve_motions(forward, numbers, ax, ay, a, bx, by, b)
-    shape = _shape(numbers)
+    # Only the numbers of a footprint determine the steps of a curve.
+    shape = to_shape(np.empty((0, 2)), np.empty(0, dtype=np.int64), np.empty((0, 3)), numbers)
     x, y, yaw = ax / numbers[SIZE], ay / numbers[SIZE], a
     total = 0.0
     for i in range(len(lengths)):
@@ -136,7 +136,10 @@ def curve_cost(
 def _chords_cost(
     costs: Bytes, x: float, y: float, yaw: float, chord: float, turn: float, steps: int
 ) -> float:
-    """Return the length of chords that each turn by so much, times the cost of their cells."""
+    """Return the sum over chords of their length times the cost of their cells.
+
+    Each chord is rotated by `turn` against the one before it.
+    """
     dx, dy = chord * math.cos(yaw + 0.5 * turn), chord * math.sin(yaw + 0.5 * turn)
     cosine, sine = math.cos(turn), math.sin(turn)
     rows, cols = costs.shape
@@ -165,25 +168,19 @@ def curve_length(
     by: float,
     b: float,
 ) -> float:
-    """Return the length of the shortest curve from a to b, along its arcs [m]."""
+    """Return the length of the shortest curve from a to b, along its arcs [m].
+
+    Parameters
+    ----------
+    forward : bool
+        Whether the curve is a Dubins curve; else a Reeds-Shepp curve.
+    numbers : ndarray, shape (8,)
+        As in `Body`.
+    ax, ay, a, bx, by, b : float [m, m, rad, m, m, rad; corner]
+        First and last pose.
+    """
     if not forward and comes_later(ax, ay, a, bx, by, b):
         ax, ay, a, bx, by, b = bx, by, b, ax, ay, a
     arcs, turns = np.zeros(SEGMENTS), np.zeros(SEGMENTS, dtype=np.int64)
     length = curve_word(forward, numbers, ax, ay, a, bx, by, b, arcs, turns)
     return float(numbers[SIZE] * numbers[TURNING] * length)
-
-
-@njit(cache=True, nogil=True)
-def _shape(numbers: Floats) -> Shape:
-    """Return what of a footprint decides how finely a curve is cut."""
-    return Shape(
-        np.empty((0, 2)),
-        np.empty(0, dtype=np.int64),
-        np.empty((0, 3)),
-        numbers[RADIUS],
-        numbers[ARM],
-        numbers[SPIKE],
-        numbers[INSCRIBED],
-        numbers[BULGE],
-        numbers[TOUCH],
-    )

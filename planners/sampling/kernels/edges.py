@@ -1,8 +1,8 @@
-"""Whether the edges between sampled states keep clear, each checked as a whole.
+"""Checks of whole edges between sampled states on a 2-D map.
 
-Places come in metres from the map's outer corner, as the sampler holds them, and are turned into
-cells here. What is looked at does not depend on a sampling step: straight lines of a disc are
-checked exactly, everything else is cut into steps whose hulls hold all that is swept.
+Positions are in metres from the map's outer corner, as in OMPL's states, and converted to cells
+here. No check depends on a sampling step: straight lines of a disc are checked exactly, all other
+motions are cut into steps whose hulls contain the swept area.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from planners.geometry.kernels.swept_footprint import (
 )
 from planners.sampling.kernels.lines import line_clear
 
-PIECE = 4.0  # [cells] curves are cut into motions of that length
-# What `Body.numbers` holds.
+PIECE = 4.0  # [cells] longest motion that a curve is cut into
+# Positions in `Body.numbers`.
 SIZE, TURNING, RADIUS, ARM, SPIKE, INSCRIBED, BULGE, TOUCH = range(8)
 
 
 class Body(NamedTuple):
-    """Map and footprint as plain arrays: each call from Python unpacks them anew."""
+    """Map and footprint as plain arrays, which each call from Python unpacks anew."""
 
     blocked: Bools  #: shape (rows, cols)
     before: Ints  #: as in `Ground`
@@ -58,23 +58,24 @@ def slide_clear(
     by: float,
     b: float,
 ) -> bool:
-    """Whether a footprint overlaps nothing that moves straight from a to b and turns meanwhile.
+    """Whether a footprint that moves straight from a to b while it turns overlaps nothing blocked.
 
-    Place and yaw change evenly, the yaw by the shorter turn. Of each step, the hull of the two
-    poses is looked at, grown by what the turn in between may add; steps over which the distance
-    field vouches for the discs around the footprint are left out.
+    Position and yaw are interpolated linearly, the yaw over the shorter turn. A step is checked by
+    the hull of its two poses, grown by an upper bound of what the turn adds; steps are skipped
+    where the distance field guarantees clearance for the discs that cover the footprint.
 
     Parameters
     ----------
-    blocked, before, clearance, corners, begins, discs, numbers
+    blocked, before, clearance, corners, begins, discs, numbers : ndarray
         As in `Body`.
-    ax, ay, a, bx, by, b : float [m, rad]
+    ax, ay, a, bx, by, b : float [m, m, rad, m, m, rad; corner]
+        First and last pose.
     """
-    ground, shape = Ground(blocked, before, clearance), _shape(corners, begins, discs, numbers)
+    ground, shape = Ground(blocked, before, clearance), to_shape(corners, begins, discs, numbers)
     size, inscribed = numbers[SIZE], shape.inscribed
-    if len(corners) == 0:  # it looks the same at every yaw
+    if len(corners) == 0:  # a disc
         return line_clear(blocked, clearance, size, shape.radius, shape.touch, ax, ay, bx, by)
-    # Most edges that aren't clear cross a wall, which the disc within the footprint finds sooner.
+    # Most blocked edges cross a wall, which the check of the inscribed disc detects sooner.
     if inscribed > shape.touch and not line_clear(
         blocked, clearance, size, inscribed, shape.touch, ax, ay, bx, by
     ):
@@ -90,11 +91,11 @@ def slide_clear(
     while i < steps:
         s, t = i / steps, (i + 1) / steps
         x, y, yaw = ax + s * dx, ay + s * dy, a + s * turn
-        left_out = _room(clearance, discs, x, y, yaw) - grow
-        if left_out >= reach * (steps - i):
+        margin = _margin(clearance, discs, x, y, yaw) - grow
+        if margin >= reach * (steps - i):
             return True
-        if left_out >= reach:
-            i += math.floor(left_out / reach)
+        if margin >= reach:
+            i += math.floor(margin / reach)
             continue
         if nearness(clearance, x, y)[1] < shape.inscribed - shape.touch:
             return False
@@ -107,14 +108,20 @@ def slide_clear(
 
 @njit(cache=True, nogil=True)
 def slide_steps(shape: Shape, length: float, turn: float) -> int:
-    """Return into how many steps such a motion is cut: poses are half a cell apart at most.
+    """Return the number of steps of a straight motion, each at most half a cell long.
 
-    No point of the footprint then leaves the chord of a step by more than `Shape.bulge`.
+    No point of the footprint deviates from the chord of a step by more than `Shape.bulge`.
+
+    Parameters
+    ----------
+    shape : Shape
+    length : float [cells]
+    turn : float [rad]
     """
     steps = math.ceil(2.0 * length)
     if turn != 0.0 and shape.arm > 0.0:
-        most = math.sqrt(8.0 * shape.bulge / (shape.spike * shape.arm))
-        steps = max(steps, math.ceil(abs(turn) / most))
+        max_turn = math.sqrt(8.0 * shape.bulge / (shape.spike * shape.arm))
+        steps = max(steps, math.ceil(abs(turn) / max_turn))
     return max(steps, 1)
 
 
@@ -135,24 +142,25 @@ def curve_clear(
     by: float,
     b: float,
 ) -> bool:
-    """Whether a footprint overlaps nothing all along the shortest curve between a and b.
+    """Whether a footprint overlaps nothing blocked along the shortest curve from a to b.
 
-    That of Reeds and Shepp is the same both ways, whichever of equally short ones it is.
+    A Reeds-Shepp curve is the same in both directions, even if several are equally short.
 
     Parameters
     ----------
     forward : bool
-        Dubins' curve; otherwise that of Reeds and Shepp.
-    blocked, before, clearance, corners, begins, discs, numbers
+        Whether the curve is a Dubins curve; else a Reeds-Shepp curve.
+    blocked, before, clearance, corners, begins, discs, numbers : ndarray
         As in `Body`.
-    ax, ay, a, bx, by, b : float [m, rad]
+    ax, ay, a, bx, by, b : float [m, m, rad, m, m, rad; corner]
+        First and last pose.
     """
-    ground, shape = Ground(blocked, before, clearance), _shape(corners, begins, discs, numbers)
+    ground, shape = Ground(blocked, before, clearance), to_shape(corners, begins, discs, numbers)
     if not forward and comes_later(ax, ay, a, bx, by, b):
         ax, ay, a, bx, by, b = bx, by, b, ax, ay, a
     size = numbers[SIZE]
     x, y, yaw = ax / size, ay / size, a
-    if not (within(clearance, x, y, 0.0) and _may_stand(ground, shape, bx / size, by / size)):
+    if not (within(clearance, x, y, 0.0) and _may_fit(ground, shape, bx / size, by / size)):
         return False
     curvatures, lengths = curve_motions(forward, numbers, ax, ay, a, bx, by, b)
     if len(lengths) == 0:
@@ -176,23 +184,22 @@ def _may_pass(
     curvatures: Floats,
     lengths: Floats,
 ) -> bool:
-    """Whether base_link may be at some places along a curve: that rules out most, at once."""
+    """Whether the footprint may fit at some places along a curve: a cheap necessary condition."""
     for i in range(len(lengths)):
         at, length = 0.0, abs(lengths[i])
         while at < length:
-            driven = math.copysign(at, lengths[i])
-            at_x, at_y, _ = along(x, y, yaw, curvatures[i], driven)
-            if not _may_stand(ground, shape, at_x, at_y):
+            at_x, at_y, _ = along(x, y, yaw, curvatures[i], math.copysign(at, lengths[i]))
+            if not _may_fit(ground, shape, at_x, at_y):
                 return False
-            room = nearness(ground.clearance, at_x, at_y)[0] - shape.inscribed
-            at += max(room, 1.0)
+            margin = nearness(ground.clearance, at_x, at_y)[0] - shape.inscribed
+            at += max(margin, 1.0)
         x, y, yaw = along(x, y, yaw, curvatures[i], lengths[i])
     return True
 
 
 @njit(cache=True, nogil=True)
-def _may_stand(ground: Ground, shape: Shape, x: float, y: float) -> bool:
-    """Whether the largest disc about base_link within the footprint may be clear at a place."""
+def _may_fit(ground: Ground, shape: Shape, x: float, y: float) -> bool:
+    """Whether the inscribed disc of the footprint may be clear with base_link at a place."""
     if not within(ground.clearance, x, y, 0.0):
         return False
     if nearness(ground.clearance, x, y)[1] < shape.inscribed - shape.touch:
@@ -203,7 +210,13 @@ def _may_stand(ground: Ground, shape: Shape, x: float, y: float) -> bool:
 
 @njit(cache=True, nogil=True)
 def comes_later(ax: float, ay: float, a: float, bx: float, by: float, b: float) -> bool:
-    """Whether a is the one of two poses at which edges that are the same both ways end."""
+    """Whether an edge that is the same in both directions is computed from b to a.
+
+    Parameters
+    ----------
+    ax, ay, a, bx, by, b : float [m, m, rad, m, m, rad; corner]
+        Its ends.
+    """
     if ax != bx:
         return ax > bx
     return ay > by if ay != by else a > b
@@ -220,7 +233,22 @@ def curve_motions(
     by: float,
     b: float,
 ) -> tuple[Floats, Floats]:
-    """Return the curve from a to b as motions: curvatures [1 / cells] and lengths [cells]."""
+    """Return the shortest curve from a to b as motions.
+
+    Parameters
+    ----------
+    forward : bool
+        Whether the curve is a Dubins curve; else a Reeds-Shepp curve.
+    numbers : ndarray, shape (8,)
+        As in `Body`.
+    ax, ay, a, bx, by, b : float [m, m, rad, m, m, rad; corner]
+        First and last pose.
+
+    Returns
+    -------
+    curvatures : ndarray, shape (n,) [1 / cells]
+    lengths : ndarray, shape (n,) [cells]
+    """
     radius = numbers[TURNING]
     arcs, turns = np.zeros(SEGMENTS), np.zeros(SEGMENTS, dtype=np.int64)
     curve_word(forward, numbers, ax, ay, a, bx, by, b, arcs, turns)
@@ -250,14 +278,18 @@ def curve_word(
     arcs: Floats,
     turns: Ints,
 ) -> float:
-    """Find the curve from a to b; return its length [turning radii].
+    """Compute the shortest curve from a to b; return its length [turning radii].
 
     Parameters
     ----------
-    forward, numbers, ax, ay, a, bx, by, b
-        As for `curve_motions`.
+    forward : bool
+        Whether the curve is a Dubins curve; else a Reeds-Shepp curve.
+    numbers : ndarray, shape (8,)
+        As in `Body`.
+    ax, ay, a, bx, by, b : float [m, m, rad, m, m, rad; corner]
+        First and last pose.
     arcs, turns : ndarray, shape (5,)
-        Receive the segments, those not needed with length 0.
+        Receive the segments; unused ones have length 0.
     """
     scale = numbers[SIZE] * numbers[TURNING]
     dx, dy = (bx - ax) / scale, (by - ay) / scale
@@ -269,7 +301,14 @@ def curve_word(
 
 
 @njit(cache=True, nogil=True)
-def _shape(corners: Floats, begins: Ints, discs: Floats, numbers: Floats) -> Shape:
+def to_shape(corners: Floats, begins: Ints, discs: Floats, numbers: Floats) -> Shape:
+    """Return the footprint of a `Body`.
+
+    Parameters
+    ----------
+    corners, begins, discs, numbers : ndarray
+        As in `Body`.
+    """
     return Shape(
         corners,
         begins,
@@ -285,21 +324,21 @@ def _shape(corners: Floats, begins: Ints, discs: Floats, numbers: Floats) -> Sha
 
 @njit(cache=True, nogil=True)
 def _bulge(shape: Shape, turn: float) -> float:
-    """Return how far any point may leave its chord in a step that turns by so much.
+    """Return an upper bound of the deviation of a point from its chord in a step with a turn.
 
-    A corner is drawn to the centre by `arm` times the square of the turn per step, at most; one
-    that grows an outline with sharp corners may find `spike` times that.
+    The acceleration of a corner towards the centre is at most `arm` times the square of the turn
+    per step; growing an outline with sharp corners increases the deviation up to `spike` times.
     """
     return shape.spike * shape.arm * turn * turn / 8.0
 
 
 @njit(cache=True, nogil=True)
-def _room(clearance: Floats, discs: Floats, x: float, y: float, yaw: float) -> float:
-    """Return how far the discs that cover the footprint are from what is blocked, at least."""
+def _margin(clearance: Floats, discs: Floats, x: float, y: float, yaw: float) -> float:
+    """Return a lower bound of the distance of the covering discs to blocked squares [cells]."""
     cosine, sine = math.cos(yaw), math.sin(yaw)
-    room = math.inf
+    margin = math.inf
     for k in range(len(discs)):
         u, v, radius = discs[k, 0], discs[k, 1], discs[k, 2]
         at_x, at_y = x + cosine * u - sine * v, y + sine * u + cosine * v
-        room = min(room, nearness(clearance, at_x, at_y)[0] - radius)
-    return room
+        margin = min(margin, nearness(clearance, at_x, at_y)[0] - radius)
+    return margin

@@ -1,4 +1,4 @@
-"""Whether a ball keeps clear along straight lines between voxels, each checked as a whole.
+"""Exact checks of straight lines for a ball among voxels.
 
 As in `planners.geometry.kernels.clearance3d`, positions in voxels are (x, y, z), and voxel
 [layer, row, col] is the closed cube from (col, row, layer) to (col + 1, row + 1, layer + 1).
@@ -14,9 +14,9 @@ from numba import njit
 from groundmap.arrays import Ints32
 from planners.costmap.kernels.distance import NOWHERE
 
-NEAR = 0.2  # [voxels] room below which a line is checked exactly instead of stepped along
+NEAR = 0.2  # [voxels] margin of clearance below which a line is checked exactly
 PIECE = 1.0  # [voxels] longest piece of a line that is checked exactly
-HALVINGS = 64  # of a line, before its pieces are short: no float is that long
+HALVINGS = 64  # upper bound of the bisections of a line into short pieces
 
 
 @njit(cache=True, nogil=True)
@@ -34,21 +34,21 @@ def line_clear(
 ) -> bool:
     """Whether a ball, moved along the straight line from a to b, overlaps no blocked cube.
 
-    The distance field vouches for as much of the line, to both sides of its middle, as there is
-    room beyond the radius; what is left of either half is looked at likewise. Where that is no
-    help, the exact distance to the cubes decides.
+    The distance field guarantees that the line is clear, on both sides of its middle, over the
+    margin of clearance beyond the radius. The rest of either half is checked in the same way, short
+    pieces by their exact distance to the cubes.
 
     Parameters
     ----------
     squared : ndarray of int32, shape (layers, rows, cols)
         As `MapSpace.all_squared`.
     size : float [m]
-        Of a voxel.
+        Side of a voxel.
     radius : float [m]
     slack : float [m]
-        Shortfall of the radius that is put down to rounding.
-    ax, ay, az, bx, by, bz : float [m]
-        From the map's outer corner.
+        Shortfall of the radius that is attributed to rounding.
+    ax, ay, az, bx, by, bz : float [m, corner]
+        Start and end of the line.
     """
     x, y, z = ax / size, ay / size, az / size
     dx, dy, dz = bx / size - x, by / size - y, bz / size - z
@@ -61,19 +61,19 @@ def line_clear(
             return False
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     share = 1.0 / length if length > 0.0 else 0.0
-    left = np.empty((HALVINGS, 2))  # parts of the line that are still to be looked at
-    left[0, 0], left[0, 1] = 0.0, length
+    stack = np.empty((HALVINGS, 2))  # parts of the line that remain to be checked
+    stack[0, 0], stack[0, 1] = 0.0, length
     count = 1
     while count > 0:
         count -= 1
-        begin, end = left[count]
+        begin, end = stack[count]
         half, middle = (end - begin) / 2.0, (begin + end) / 2.0
         s = middle * share
         low, high = _nearness(squared, x + s * dx, y + s * dy, z + s * dz)
         if high < least:
             return False
-        room = low - need
-        if room >= half:
+        margin = low - need
+        if margin >= half:
             continue
         if end - begin <= PIECE:
             s, t = begin * share, (end - begin) * share
@@ -81,10 +81,10 @@ def line_clear(
             if not _piece_clear(squared, u, v, w, t * dx, t * dy, t * dz, least):
                 return False
             continue
-        if room < NEAR:
-            room = 0.0
-        left[count, 0], left[count, 1] = begin, middle - room
-        left[count + 1, 0], left[count + 1, 1] = middle + room, end
+        if margin < NEAR:
+            margin = 0.0
+        stack[count, 0], stack[count, 1] = begin, middle - margin
+        stack[count + 1, 0], stack[count + 1, 1] = middle + margin, end
         count += 2
     return True
 
@@ -97,9 +97,9 @@ def _within(squared: Ints32, x: float, y: float, z: float) -> bool:
 
 @njit(cache=True, nogil=True)
 def _nearness(squared: Ints32, x: float, y: float, z: float) -> tuple[float, float]:
-    """Return bounds of the clearance at a point, from that at its voxel's centre.
+    """Return lower and upper bounds of the clearance at a point, from its voxel's centre.
 
-    Points that rounding moved off the map are told of from the nearest voxel.
+    For a point that rounding moved off the map, the nearest voxel is used.
     """
     layers, rows, cols = squared.shape
     col = min(max(math.floor(x), 0), cols - 1)
@@ -123,7 +123,10 @@ def _piece_clear(
     dz: float,
     least: float,
 ) -> bool:
-    """Whether all blocked cubes are at `least` so far from the line from (x, y, z) on."""
+    """Whether all blocked cubes are at least `least` away from a short line.
+
+    The line starts at (x, y, z) and has the direction and length of (dx, dy, dz).
+    """
     layers, rows, cols = squared.shape
     limit = least * least
     left, right = min(x, x + dx), max(x, x + dx)
@@ -152,10 +155,10 @@ def _piece_clear(
 
 @njit(cache=True, nogil=True)
 def _cube_squared(x: float, y: float, z: float, dx: float, dy: float, dz: float) -> float:
-    """Return the squared distance of the line from (x, y, z) on to the unit cube at the origin.
+    """Return the squared distance of a line from (x, y, z) to the unit cube at the origin.
 
-    Along the line it is convex; its slope is linear between the places where a coordinate passes
-    a border of the cube. Each of these narrows down where the slope changes sign.
+    It is convex along the line, and its slope is linear between the points where a coordinate
+    crosses a border of the cube. Each of these narrows the interval where the slope changes sign.
     """
     begin, end = 0.0, 1.0
     falls, rises = _slope(x, y, z, dx, dy, dz, 0.0), _slope(x, y, z, dx, dy, dz, 1.0)
@@ -186,5 +189,5 @@ def _slope(x: float, y: float, z: float, dx: float, dy: float, dz: float, t: flo
 
 @njit(cache=True, nogil=True)
 def _gap(position: float) -> float:
-    """Return how far a coordinate is beyond the unit interval: negative below it."""
+    """Return the signed distance of a coordinate to the unit interval, negative below it."""
     return min(position, 0.0) + max(position - 1.0, 0.0)

@@ -1,8 +1,7 @@
 """The checks of `planners.sampling.kernels.edges`, for callers that keep the `Body` in a table.
 
-Each takes the address of that table (see `planners.sampling.kernels.addresses`) and the numbers of
-two states. They hold on to the interpreter's lock: to let go of it takes about as long as an
-answer.
+Each takes the address of that table (see `planners.sampling.kernels.addresses`) and the coordinates
+of two states. They hold the interpreter lock, as releasing it takes about as long as a check.
 """
 
 from __future__ import annotations
@@ -14,15 +13,23 @@ from planners.sampling.kernels.addresses import bools_at, floats_at, ints_at
 from planners.sampling.kernels.edges import ARM, RADIUS, SIZE, TOUCH, Body, curve_clear, slide_clear
 from planners.sampling.kernels.lines import line_clear
 
-# Where the table has the fields of `Body`.
+# Positions of the fields of `Body` in the table.
 BLOCKED, BEFORE, CLEARANCE, CORNERS, BEGINS, DISCS, NUMBERS = range(len(Body._fields))
 
 
 @njit(cache=True)
 def line_clear_at(table: int, ax: float, ay: float, bx: float, by: float) -> bool:
-    """Whether `line_clear`, for the smallest disc about base_link that holds the footprint."""
+    """Whether a line is clear (`line_clear`) for the disc around base_link and the footprint.
+
+    Parameters
+    ----------
+    table : int
+        Address of the table.
+    ax, ay, bx, by : float [m, corner]
+        Start and end of the line.
+    """
     numbers = floats_at(table, NUMBERS)
-    size, radius = numbers[SIZE, 0], numbers[RADIUS, 0] + numbers[ARM, 0]  # one of these is 0
+    size, radius = numbers[SIZE, 0], numbers[RADIUS, 0] + numbers[ARM, 0]  # either one is 0
     blocked, clearance = bools_at(table, BLOCKED), floats_at(table, CLEARANCE)
     return line_clear(blocked, clearance, size, radius, numbers[TOUCH, 0], ax, ay, bx, by)
 
@@ -31,7 +38,15 @@ def line_clear_at(table: int, ax: float, ay: float, bx: float, by: float) -> boo
 def slide_clear_at(
     table: int, ax: float, ay: float, a: float, bx: float, by: float, b: float
 ) -> bool:
-    """Whether `slide_clear`."""
+    """Whether a straight motion is clear (`slide_clear`).
+
+    Parameters
+    ----------
+    table : int
+        Address of the table.
+    ax, ay, a, bx, by, b : float [m, m, rad, m, m, rad; corner]
+        Its first and last pose.
+    """
     return slide_clear(*_body_at(table), ax, ay, a, bx, by, b)
 
 
@@ -39,7 +54,15 @@ def slide_clear_at(
 def dubins_clear_at(
     table: int, ax: float, ay: float, a: float, bx: float, by: float, b: float
 ) -> bool:
-    """Whether `curve_clear`, forward."""
+    """Whether a Dubins curve is clear (`curve_clear`).
+
+    Parameters
+    ----------
+    table : int
+        Address of the table.
+    ax, ay, a, bx, by, b : float [m, m, rad, m, m, rad; corner]
+        Its first and last pose.
+    """
     return curve_clear(True, *_body_at(table), ax, ay, a, bx, by, b)
 
 
@@ -47,7 +70,15 @@ def dubins_clear_at(
 def reeds_shepp_clear_at(
     table: int, ax: float, ay: float, a: float, bx: float, by: float, b: float
 ) -> bool:
-    """Whether `curve_clear`, both ways."""
+    """Whether a Reeds-Shepp curve is clear (`curve_clear`).
+
+    Parameters
+    ----------
+    table : int
+        Address of the table.
+    ax, ay, a, bx, by, b : float [m, m, rad, m, m, rad; corner]
+        Its first and last pose.
+    """
     return curve_clear(False, *_body_at(table), ax, ay, a, bx, by, b)
 
 

@@ -1,4 +1,4 @@
-"""Whether a disc keeps clear along a straight line, checked exactly and as a whole."""
+"""Exact check of a straight line for a disc."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from groundmap.arrays import Bools, Floats
 from planners.geometry.kernels.clearance import square_distance
 from planners.geometry.kernels.swept_footprint import within
 
-NEAR = 0.2  # [cells] room below which a line is checked exactly instead of stepped along
+NEAR = 0.2  # [cells] margin of clearance below which a line is checked exactly
 
 
 @njit(cache=True, nogil=True)
@@ -27,24 +27,25 @@ def line_clear(
 ) -> bool:
     """Whether a disc, moved along the straight line from a to b, overlaps no blocked square.
 
-    Where the distance field vouches for room, the line is followed by as much at once; elsewhere
-    its exact distance to the squares decides, a cell's side at a time.
+    Where the distance field guarantees a margin of clearance, a step of that length is skipped;
+    elsewhere the exact distance to the squares is computed for pieces of one cell.
 
     Parameters
     ----------
     blocked : ndarray of bool, shape (rows, cols)
     clearance : ndarray, shape (rows, cols) [cells]
     size : float [m]
-        Of a cell.
+        Side of a cell.
     radius : float [cells]
     touch : float [cells]
-        Overlap that is put down to rounding.
-    ax, ay, bx, by : float [m]
+        Overlap that is attributed to rounding.
+    ax, ay, bx, by : float [m, corner]
+        Start and end of the line.
     """
     ax, ay, bx, by = ax / size, ay / size, bx / size, by / size
     if not (within(clearance, ax, ay, 0.0) and within(clearance, bx, by, 0.0)):
         return False
-    if blocked[int(by), int(bx)]:  # a planner knows the state that it comes from to be clear
+    if blocked[int(by), int(bx)]:  # planners extend from states that are clear
         return False
     need = max(radius, 2.0 * touch)
     dx, dy = bx - ax, by - ay
@@ -55,7 +56,7 @@ def line_clear(
     at = 0.0
     while True:
         x, y = ax + at * dx, ay + at * dy
-        row, col = min(int(y), rows - 1), min(int(x), cols - 1)  # rounding may lead to the border
+        row, col = min(int(y), rows - 1), min(int(x), cols - 1)  # rounding may yield the border
         off_x, off_y = x - col - 0.5, y - row - 0.5
         off = math.sqrt(off_x * off_x + off_y * off_y)
         room = clearance[row, col] - need
@@ -76,7 +77,7 @@ def line_clear(
 def _piece_clear(
     blocked: Bools, ax: float, ay: float, bx: float, by: float, need: float, touch: float
 ) -> bool:
-    """Whether a short segment is as far as `need` from all blocked squares."""
+    """Whether a short segment is at least `need` from all blocked squares."""
     rows, cols = blocked.shape
     left, right = math.floor(min(ax, bx) - need), math.floor(max(ax, bx) + need)
     low, high = math.floor(min(ay, by) - need), math.floor(max(ay, by) + need)

@@ -1,4 +1,4 @@
-"""The cheapest path through a roadmap: A* over edges that lie in arrays."""
+"""The cheapest path through a roadmap: A* over a graph in compressed sparse rows."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numba import njit
 from groundmap.arrays import Floats, Ints
 from planners.search.kernels.heap import drop_top, push, top_node
 
-UNIT = 2.0**20  # of the heap's whole keys, in one of the costs'
+UNIT = 2.0**20  # the heap's integer keys per unit of cost
 
 
 @njit(cache=True, nogil=True)
@@ -25,27 +25,27 @@ def cheapest_path(
     source_costs: Floats,
     target_costs: Floats,
 ) -> Ints:
-    """Return the vertices along the cheapest path from one of some vertices to one of others.
+    """Return the vertices of the cheapest path from any source to any target.
 
     Parameters
     ----------
     first : ndarray of int64, shape (n + 1,)
         Edges first[v] to first[v + 1] leave vertex v.
     heads : ndarray of int64, shape (m,)
-        Vertices that the edges lead to.
+        Vertices at which the edges end.
     costs : ndarray, shape (m,)
-        Of the edges; infinite for those that can't be taken.
-    places : ndarray, shape (n, 2) [m]
+        Of the edges; infinite for blocked ones.
+    places : ndarray, shape (n, 2) [m, corner]
         Of the vertices.
     rate : float [1/m]
-        No edge costs less per metre between its ends.
-    goal : ndarray, shape (2,) [m]
+        Lower bound of an edge's cost per metre between its ends.
+    goal : ndarray, shape (2,) [m, corner]
     sources : ndarray of int64, shape (k,)
-        Vertices to begin with.
+        First vertices of a path.
     source_costs : ndarray, shape (k,)
-        What it costs to get there.
+        From the start to the sources.
     target_costs : ndarray, shape (n,)
-        What it costs to get from a vertex to the goal; infinite where the path can't end.
+        From a vertex to the goal; infinite if it is no target.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def cheapest_path(
         vertex = sources[k]
         if source_costs[k] < cost[vertex]:
             cost[vertex] = source_costs[k]
-            estimate = cost[vertex] + rate * _away(places, vertex, goal)
+            estimate = cost[vertex] + rate * _distance(places, vertex, goal)
             size = push(heap, size, int(UNIT * estimate), 0, vertex)
     best, end = math.inf, -1
     while size > 0 and heap[0, 0] < UNIT * best:
@@ -76,7 +76,7 @@ def cheapest_path(
             through = cost[vertex] + costs[edge]
             if through < cost[head] and not done[head]:
                 cost[head], came[head] = through, vertex
-                estimate = through + rate * _away(places, head, goal)
+                estimate = through + rate * _distance(places, head, goal)
                 size = push(heap, size, int(UNIT * estimate), 0, head)
     length, vertex = 0, end
     while vertex >= 0:
@@ -88,5 +88,5 @@ def cheapest_path(
 
 
 @njit(cache=True, nogil=True)
-def _away(places: Floats, vertex: int, goal: Floats) -> float:
+def _distance(places: Floats, vertex: int, goal: Floats) -> float:
     return math.hypot(goal[0] - places[vertex, 0], goal[1] - places[vertex, 1])
