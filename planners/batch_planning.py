@@ -99,7 +99,7 @@ def plan_many(
         raise ProblemError("audit", "True or False", repr(audit))
     chosen = get_planner(planner)
     options = chosen.settings(**settings)
-    headings = chosen.headings and options.heeds_headings(problem)
+    headings = chosen.headings and options.uses_headings(problem)
     turned = (("start",) if options.takes_other_goals else ("start", "goal")) if headings else ()
     problems = _problems(problem, pairs, turned=turned)
     workers = min(_threads(threads), max(len(problems), 1))
@@ -185,7 +185,7 @@ def _route(desk: _Desk, engine: Engine, problem: PlanningProblem) -> Route:
         engine,
         desk.settings,
         began=began,
-        headings=desk.headings and desk.settings.heeds_headings(problem),
+        headings=desk.headings and desk.settings.uses_headings(problem),
         audited=desk.audited,
         watch=desk.watch,
     )

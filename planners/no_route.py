@@ -17,7 +17,7 @@ from planners.errors import EnclosedError
 from planners.problem.footprint import Footprint
 from planners.problem.problem import PlanningProblem
 from planners.search.distance_field import reachable
-from planners.search.widest_path import LATTICE_SLACK, WidestRoute, widest_way
+from planners.search.widest_path import LATTICE_SLACK, WidestRoute, widest_path
 
 
 def explain_enclosure(costmap: Costmap, *, needed: float | None = None) -> EnclosedError:
@@ -43,7 +43,7 @@ def explain_enclosure(costmap: Costmap, *, needed: float | None = None) -> Enclo
     place: Place = "start" if from_start.sum() < from_goal.sum() else "goal"
     fenced = from_start if place == "start" else from_goal
     nearest, distance = _nearest(costmap, from_start)
-    widest = widest_way(costmap, seen_from=place)
+    widest = widest_path(costmap, seen_from=place)
     turning: Turning = "none" if problem.shape.is_disc else "anyhow"
     return EnclosedError(
         place,
@@ -89,7 +89,7 @@ def widest_route(problem: PlanningProblem) -> WidestRoute:
     """
     point = replace(problem, footprint=Footprint.of(0.0), clear_start_radius=problem.clear_radius)
     costmap = costmap_of(point)
-    widest = widest_way(costmap)
+    widest = widest_path(costmap)
     if widest is None:
         raise explain_enclosure(costmap)
     return widest

@@ -79,7 +79,7 @@ def plan(
     space = space_of(problem)
     if isinstance(space, Voxels) and not entry.spatial:
         return solve(space, _engine_3d(space, planner), chosen, began=began)
-    headings = entry.headings and chosen.heeds_headings(problem)
+    headings = entry.headings and chosen.uses_headings(problem)
     return solve(space, entry.engine(space), chosen, began=began, headings=headings, watch=watch)
 
 

@@ -74,7 +74,7 @@ def solve(
         )
     if result.goal is not None:
         axes = problem.grid.ndim
-        if audited and not settings.will_do(result.goal, goal, axes=axes):
+        if audited and not settings.accepts_end(result.goal, goal, axes=axes):
             off = math.dist(result.goal[:axes], goal[:axes])
             raise AuditError("ends at no goal", result.goal[:axes], got=off, needed=0.0)
         space = with_problem(

@@ -173,7 +173,7 @@ class SamplingPlanner:
         )
         axes = len(begin) if validator.space in FLAT else 2
         place = start[:axes] if validator.space in FLAT else start
-        if settings.takes_other_goals and settings.will_do(place, goal, axes=axes):
+        if settings.takes_other_goals and settings.accepts_end(place, goal, axes=axes):
             goals = [begin]
         if not goals and settings.takes_other_goals:
             if not goal_states(validator, settings, goal, settings.seed):

@@ -147,7 +147,7 @@ class SamplingSettings(SearchSettings):
             raise PydanticCustomError("places", "a list of places, such as [[3, 4], [5, 6]]")
         return [tuple(one) for one in goals]
 
-    def heeds_headings(self, problem: PlanningProblem) -> bool:
+    def uses_headings(self, problem: PlanningProblem) -> bool:
         """Whether an outline is turned with the robot."""
         start, goal = tuple(map(float, problem.start)), tuple(map(float, problem.goal))
         return self.space_for(problem.shape, start, goal, axes=problem.grid.ndim) not in FLAT
@@ -157,7 +157,7 @@ class SamplingSettings(SearchSettings):
         """Whether a route may end elsewhere than at the problem's goal."""
         return bool(self.goals) or self.goal_radius > 0 or self.goal_yaw_tolerance > 0
 
-    def will_do(self, end: Pose, goal: Pose, *, axes: int) -> bool:
+    def accepts_end(self, end: Pose, goal: Pose, *, axes: int) -> bool:
         """Whether a route to a goal may end in a pose: near enough to one, turned as it will do."""
         near, turned = self.goal_radius + GOAL_TOLERANCE, self.goal_yaw_tolerance + GOAL_TOLERANCE
         return any(

@@ -199,7 +199,7 @@ def test_cut_short_anywhere_the_bound_holds(
 ) -> None:
     costmap, (looks, budget) = costmap_of(*query), cut
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("planners.search.ara.SLICE", budget)
+        patch.setattr(ARA, "slice_size", budget)
         patch.setattr("planners.search.ara.Clock", clock_of(looks))
         engine = ARA(costmap)
         try:
@@ -253,7 +253,7 @@ def test_no_route_through_a_cell_that_waits_costs_less_than_the_least_total(seed
         octile = (away[1] - away[0]) * ONE + away[0] * DIAGONAL + joined.targets[:, 2:]
         totals = engine.labels[:, 0] + octile.min(axis=0)
         least = min(int(totals[waits].min(initial=FAR)), int(engine.state[BEST]))
-        assert engine._least_total(joined) == least
+        assert engine._least_total(joined.targets) == least
         assert better.bound <= engine.state[BEST] / least
 
     searched(engine, ARASettings(first_weight=10), on_improved=report)
@@ -298,8 +298,8 @@ def test_the_bound_asked_for_is_enough() -> None:
 
 def test_slices_and_a_growing_heap_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = [searched(ARA(costmap_of(seed))) for seed in range(6)]
-    monkeypatch.setattr("planners.search.ara.SLICE", 7)
-    monkeypatch.setattr("planners.search.ara.FIRST_ROOM", 9)
+    monkeypatch.setattr(ARA, "slice_size", 7)
+    monkeypatch.setattr(ARA, "first_room", 9)
     for seed, (_, reports) in enumerate(whole):
         _, sliced = searched(ARA(costmap_of(seed)))
         assert summary(sliced) == summary(reports)

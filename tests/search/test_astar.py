@@ -94,8 +94,8 @@ def test_slices_and_a_growing_heap_change_nothing(
     grid = grid_of(np.where(mazes(seed), BLOCKED, FREE))
     problem = PlanningProblem(grid, start=(1.7, 1.6), goal=(68.2, 68.4), footprint=0.0)
     whole = plan(problem)
-    monkeypatch.setattr("planners.search.astar.SLICE", 7)
-    monkeypatch.setattr("planners.search.astar.FIRST_ROOM", 9)
+    monkeypatch.setattr(AStar, "slice_size", 7)
+    monkeypatch.setattr(AStar, "first_room", 9)
     sliced = plan(problem)
     np.testing.assert_array_equal(sliced.waypoints, whole.waypoints)
     assert sliced.expanded == whole.expanded

@@ -276,8 +276,8 @@ def test_slices_a_growing_heap_and_earlier_queries_change_nothing(
     pairs = [ends(rng, blocked) for _ in range(15)]
     problem = posed(blocked, *pairs[0], 0.0)
     whole = [AStar3D(Voxels.of(problem)).search(*ask(pair), SearchSettings()) for pair in pairs]
-    monkeypatch.setattr("planners.search.astar3d.SLICE", 7)
-    monkeypatch.setattr("planners.search.astar3d.FIRST_ROOM", 30)
+    monkeypatch.setattr(AStar3D, "slice_size", 7)
+    monkeypatch.setattr(AStar3D, "first_room", 30)
     engine = AStar3D(Voxels.of(problem))
     for pair, expected in zip(pairs, whole, strict=True):
         found = engine.search(*ask(pair), SearchSettings())

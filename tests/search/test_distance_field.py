@@ -22,6 +22,7 @@ from planners.costmap.endpoints import ends_of
 from planners.costmap.kernels.moves import COLS, ONE, ROWS
 from planners.search.astar import AStar, AStarSettings
 from planners.search.distance_field import distance_field, reachable
+from planners.search.grid_search import GridSearch
 
 DEAR = CostSettings(clearance_weight=9.0, inflation_radius=3.0, confidence_weight=40.0)
 RADII = [0.0, 0.5, 1.0]
@@ -151,7 +152,7 @@ def test_slices_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     costmap = Costmap.of(replace(drawn(4), costs=DEAR))
     whole = distance_field(costmap, (3.3, 4.1))
     assert np.isfinite(whole).sum() > 100
-    monkeypatch.setattr("planners.search.distance_field.SLICE", 3)
+    monkeypatch.setattr(GridSearch, "slice_size", 3)
     np.testing.assert_array_equal(distance_field(costmap, (3.3, 4.1)), whole)
 
 

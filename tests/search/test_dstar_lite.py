@@ -309,8 +309,8 @@ def test_other_prices_begin_anew() -> None:
 
 def test_slices_and_a_growing_heap_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = driven()
-    monkeypatch.setattr("planners.search.dstar_lite.SLICE", 7)
-    monkeypatch.setattr("planners.search.dstar_lite.FIRST_ROOM", 10)
+    monkeypatch.setattr(DStarLite, "slice_size", 7)
+    monkeypatch.setattr(DStarLite, "first_room", 10)
     assert driven() == whole
 
 
@@ -338,7 +338,7 @@ def test_a_search_that_ran_out_of_time_goes_on_where_it_ended(
     expected = DStarLite(Costmap.of(problem)).search(problem.start_xy, GOAL, DStarLiteSettings())
     assert expected is not None
     engine = DStarLite(Costmap.of(problem))
-    monkeypatch.setattr("planners.search.dstar_lite.SLICE", 1)
+    monkeypatch.setattr(DStarLite, "slice_size", 1)
     with pytest.raises(TimeLimitError, match=r"dstar_lite: no route within time_limit = 0.0002 s"):
         engine.search(problem.start_xy, GOAL, DStarLiteSettings(time_limit=2e-4))
     found = engine.search(problem.start_xy, GOAL, DStarLiteSettings(time_limit=None))

@@ -226,8 +226,8 @@ def test_slices_and_growing_arrays_change_nothing(monkeypatch: pytest.MonkeyPatc
     costmap = costmap_of(rooms(np.random.default_rng(3)), CAR)
     ends = (3.0, 3.0, 0.0), (12.0, 12.5, 1.0)
     whole = routed(costmap, *ends)
-    monkeypatch.setattr("planners.search.hybrid_astar.SLICE", 7)
-    monkeypatch.setattr("planners.search.hybrid_astar.FIRST_ROOM", 4)
+    monkeypatch.setattr(HybridAStar, "slice_size", 7)
+    monkeypatch.setattr(HybridAStar, "first_room", 4)
     sliced = routed(costmap, *ends)
     assert whole is not None
     assert sliced is not None

@@ -267,7 +267,7 @@ def test_a_time_limit_of_zero_is_over_at_once(engine_class: type[JPS], name: str
 @pytest.mark.parametrize("engine_class", [JPS, JPSPlus])
 def test_costs_that_differ_are_refused(engine_class: type[JPS]) -> None:
     costmap = costmap_of(free_field(20, 20) > 0, costs=CostSettings(clearance_weight=2.0))
-    with pytest.raises(ProblemError, match=r"planner: expected uniform costs.*Take 'astar'"):
+    with pytest.raises(ProblemError, match=r"planner: expected uniform costs.*Use 'astar'"):
         engine_class(costmap)
 
 

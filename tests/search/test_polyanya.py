@@ -218,8 +218,8 @@ def test_slices_and_growing_room_change_nothing(monkeypatch: pytest.MonkeyPatch)
     ends = centre((1, 1)), centre((58, 58))
     engine = Polyanya(costmap)
     whole = engine.search(*ends, SETTINGS)
-    monkeypatch.setattr("planners.search.polyanya.SLICE", 7)
-    monkeypatch.setattr("planners.search.polyanya.FIRST_ROOM", 9)
+    monkeypatch.setattr(Polyanya, "slice_size", 7)
+    monkeypatch.setattr(Polyanya, "first_room", 9)
     sliced, again = Polyanya(costmap).search(*ends, SETTINGS), engine.search(*ends, SETTINGS)
     for other in (sliced, again):
         assert whole is not None
@@ -257,7 +257,7 @@ def test_costs_are_refused() -> None:
     costs = CostSettings(clearance_weight=1.0)
     grid = grid_of(free_field(8, 8))
     problem = PlanningProblem(grid, start=(4, 4), goal=(5, 5), footprint=1.0, costs=costs)
-    with pytest.raises(ProblemError, match=r"which 'polyanya' needs.*Take 'astar'"):
+    with pytest.raises(ProblemError, match=r"which 'polyanya' needs.*Use 'astar'"):
         Polyanya(Costmap.of(problem))
 
 

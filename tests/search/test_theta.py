@@ -161,8 +161,8 @@ def test_slices_and_a_growing_heap_change_nothing(
     ends = centre((1, 1)), centre((58, 58))
     searching = engine(costmap)
     whole = searching.search(*ends, options)
-    monkeypatch.setattr("planners.search.theta.SLICE", 7)
-    monkeypatch.setattr("planners.search.theta.FIRST_ROOM", 9)
+    monkeypatch.setattr(Theta, "slice_size", 7)
+    monkeypatch.setattr(Theta, "first_room", 9)
     sliced = engine(costmap).search(*ends, options)
     assert whole is not None
     assert sliced is not None
@@ -202,5 +202,5 @@ def test_costs_are_refused(engine: type[Theta], options: ThetaSettings) -> None:
     costs = CostSettings(clearance_weight=1.0)
     grid = grid_of(free_field(8, 8))
     problem = PlanningProblem(grid, start=(4, 4), goal=(5, 5), footprint=1.0, costs=costs)
-    with pytest.raises(ProblemError, match=rf"which '{engine.name}' needs.*Take 'astar'"):
+    with pytest.raises(ProblemError, match=rf"which '{engine.name}' needs.*Use 'astar'"):
         engine(Costmap.of(problem))

@@ -35,7 +35,7 @@ from planners.costmap.kernels.moves import COLS, ROWS
 from planners.no_route import widest_route
 from planners.search.kernels.lattice import squared_clearance
 from planners.search.kernels.widest_path import UNIT, WIDER, spread, steps_over
-from planners.search.widest_path import WidestRoute, widest_way
+from planners.search.widest_path import WidestRoute, widest_path
 
 CUT = 2e-9  # [cells]: by so much squares of 0.05 cells and more, cut to 2^-30, may be off
 OFFSETS = st.sampled_from([0.0, 0.1, 0.25, 0.3, 0.5, 0.7, 0.75])
@@ -161,7 +161,7 @@ def test_no_way_is_wider_and_of_those_as_wide_none_is_half_as_long(
 ) -> None:
     blocked, a, b = drawn_case
     graph = Graph(blocked, a, b)
-    route = widest_way(costmap_of_mask(blocked, a, b))
+    route = widest_path(costmap_of_mask(blocked, a, b))
     expected = graph.widest()
     if route is None:
         assert expected == 0.0
@@ -182,7 +182,7 @@ def test_the_bottleneck_is_on_the_way_where_that_is_narrowest(
 ) -> None:
     blocked, a, b = drawn_case
     for place in ("start", "goal"):
-        route = widest_way(costmap_of_mask(blocked, a, b), seen_from=place)
+        route = widest_path(costmap_of_mask(blocked, a, b), seen_from=place)
         assume(route is not None)
         assert isinstance(route, WidestRoute)
         spot = shapely.Point(route.bottleneck)
@@ -196,7 +196,7 @@ def test_the_bottleneck_is_on_the_way_where_that_is_narrowest(
 @settings(max_examples=60, deadline=None)
 def test_back_is_as_wide_as_there(drawn_case: tuple[Bools, Any, Any]) -> None:
     blocked, a, b = drawn_case
-    there, back = (widest_way(costmap_of_mask(blocked, *ends)) for ends in ((a, b), (b, a)))
+    there, back = (widest_path(costmap_of_mask(blocked, *ends)) for ends in ((a, b), (b, a)))
     assert (there is None) == (back is None)
     if there is not None and back is not None:
         assert there.width == pytest.approx(back.width, abs=2 * CUT)
@@ -272,7 +272,7 @@ def test_of_two_gaps_the_narrower_is_the_bottleneck() -> None:
 
 def test_of_two_equal_gaps_the_bottleneck_is_that_on_the_side_it_is_seen_from() -> None:
     costmap = Costmap.of(problem(two_rooms((20, 10, 13), (40, 50, 53)), (9.5, 30.5), (55.5, 30.5)))
-    seen = {place: widest_way(costmap, seen_from=place) for place in ("start", "goal")}
+    seen = {place: widest_path(costmap, seen_from=place) for place in ("start", "goal")}
     spots = {place: route.bottleneck for place, route in seen.items() if route is not None}
     assert spots == {"start": (21.0, 11.5), "goal": (41.0, 51.5)}
 

@@ -19,11 +19,15 @@ from planners.costmap.kernels.moves import COLS, ROWS
 from planners.search.kernels.astar import (
     BEST,
     CAME,
+    EXHAUSTED,
     EXPANDED,
     FAR,
+    FOUND,
+    HEAP_FULL,
     MARK,
     ROOT,
     SIZE,
+    SLICE_DONE,
     TARGET,
     estimate,
     inflate,
@@ -31,7 +35,6 @@ from planners.search.kernels.astar import (
 from planners.search.kernels.heap import drop_top, push, replace_top, top_node
 
 WAITS = 16  # the part of a mark that says so
-SLICE_DONE, DONE, HEAP_FULL = range(3)  # what `advance` returns
 
 
 @njit(cache=True, nogil=True)
@@ -63,12 +66,12 @@ def advance(
     Returns
     -------
     int
-        `DONE` (no route costs less than `state[BEST]` / weight), `SLICE_DONE`, or `HEAP_FULL`
-        (call again with more room).
+        `FOUND` (no route costs less than `state[BEST]` / weight), `EXHAUSTED` (there is none),
+        `SLICE_DONE`, or `HEAP_FULL` (call again with more room).
     """
     fresh, now, end = MARK * first, MARK * turn, state[EXPANDED] + budget
     size, expanded, best = state[SIZE], state[EXPANDED], state[BEST]
-    status = DONE
+    status = EXHAUSTED
     while size > 0 and heap[0, 0] < best:
         if expanded >= end or size + 8 > len(heap):
             status = SLICE_DONE if expanded >= end else HEAP_FULL
@@ -109,6 +112,8 @@ def advance(
                 on_top = False
         if on_top:
             size = drop_top(heap, size)
+    if status == EXHAUSTED and best < FAR:
+        status = FOUND
     state[SIZE], state[EXPANDED], state[BEST] = size, expanded, best
     return status
 

@@ -47,6 +47,36 @@ def inflate(h: int, weight: int) -> int:
 
 
 @njit(cache=True, nogil=True)
+def seed(
+    sources: Ints, targets: Ints, weight: int, width: int, mark: int, labels: Ints, heap: Ints
+) -> int:
+    """Put the sources on an empty heap and return its size.
+
+    Parameters
+    ----------
+    sources, targets : ndarray of int64, shape (n, 3)
+        Row, column and cost of the cells that are joined to the start, and to the goal.
+    weight : int
+        Weight of the estimate, in 1/256.
+    width : int
+        Cells in a row.
+    mark : int
+        Mark of the sources.
+    labels : ndarray of int64, shape (cells, 2)
+        Cost so far and mark of every cell.
+    heap : ndarray of int64, shape (room, 2)
+    """
+    size = 0
+    for i in range(len(sources)):
+        row, col, cost = sources[i, 0], sources[i, 1], sources[i, 2]
+        node = row * width + col
+        labels[node, 0], labels[node, 1] = cost, mark
+        h = inflate(estimate(row, col, targets), weight)
+        size = push(heap, size, cost + h, h, node)
+    return size
+
+
+@njit(cache=True, nogil=True)
 def advance(
     moves: Bytes,
     costs: Bytes,

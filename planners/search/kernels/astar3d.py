@@ -23,13 +23,22 @@ from numba import njit
 
 from groundmap.arrays import Bools, Ints, Ints32
 from planners.costmap.kernels.moves import DIAGONAL, ONE
-from planners.search.kernels.astar import EXHAUSTED, FAR, FOUND, HEAP_FULL, SLICE_DONE
+from planners.search.kernels.astar import (
+    BEST,
+    EXHAUSTED,
+    EXPANDED,
+    FAR,
+    FOUND,
+    HEAP_FULL,
+    SIZE,
+    SLICE_DONE,
+    TARGET,
+)
 from planners.search.kernels.heap import drop_top, push, replace_top, top_node
 
 SPACE = 7439101574  # round(sqrt(3) * ONE)
 MARK, CLOSED, CAME, ROOT = 64, 32, 31, 13  # parts of a mark; ROOT: no move led here
 EVERYWHERE, NEVER = 2**27 - 1, 2**27  # masks: the robot may stand all around; not a voxel
-SIZE, BEST, TARGET, EXPANDED = range(4)  # entries of `state`
 
 #: Layer, row and column that each move adds; shape (27, 3).
 STEPS = np.array(list(itertools.product((-1, 0, 1), repeat=3)), dtype=np.int64)
@@ -101,6 +110,34 @@ def plates_of(traversable: Bools) -> Ints32:
                         i, j = k // 3 - 1, k % 3 - 1
                         plates[layer, row - i, col - j] |= 1 << k
     return plates.ravel()
+
+
+@njit(cache=True, nogil=True)
+def seed(
+    sources: Ints, targets: Ints, width: int, slab: int, mark: int, labels: Ints, heap: Ints
+) -> int:
+    """Put the sources on an empty heap and return its size.
+
+    Parameters
+    ----------
+    sources, targets : ndarray of int64, shape (n, 4)
+        Layer, row, column and cost of the voxels that are joined to the start, and to the goal.
+    width, slab : int
+        Voxels in a row, and in a layer.
+    mark : int
+        Mark of the sources.
+    labels : ndarray of int64, shape (voxels, 2)
+        Cost so far and mark of every voxel.
+    heap : ndarray of int64, shape (room, 2)
+    """
+    size = 0
+    for i in range(len(sources)):
+        layer, row, col, cost = sources[i, 0], sources[i, 1], sources[i, 2], sources[i, 3]
+        node = layer * slab + row * width + col
+        labels[node, 0], labels[node, 1] = cost, mark
+        h = estimate(layer, row, col, targets)
+        size = push(heap, size, cost + h, h, node)
+    return size
 
 
 @njit(cache=True, nogil=True)

@@ -19,7 +19,7 @@ from planners.costmap.kernels.moves import COLS, ROWS
 from planners.search.kernels.astar import FAR
 
 ONE_BITS = 32  # ONE is 2**32
-NOBODY = -1
+NO_CELL = -1
 BUCKET, WAITING, SETTLED = range(3)  # entries of `state`
 NEXT, PREVIOUS = range(2)  # columns of `chain`
 
@@ -71,7 +71,7 @@ def settle(
     chain : ndarray of int32, shape (cells, 2)
         Neighbours in the bucket's list.
     heads : ndarray of int32, shape (buckets,)
-        First cell of each bucket; `NOBODY` to begin with. One more bucket than the dearest move
+        First cell of each bucket; `NO_CELL` to begin with. One more bucket than the dearest move
         or source costs in whole `ONE`s, and one for the rest.
     state : ndarray of int64, shape (3,)
         Number of the bucket in hand, cells that wait, cells settled; zeros to begin with.
@@ -79,7 +79,7 @@ def settle(
     end = state[SETTLED] + budget
     while state[WAITING] > 0 and state[SETTLED] < end:
         node = heads[state[BUCKET] % len(heads)]
-        if node == NOBODY:
+        if node == NO_CELL:
             state[BUCKET] += 1
             continue
         _leave(node, labels, chain, heads, state)
@@ -102,8 +102,8 @@ def _reach(node: int, cost: int, labels: Ints, chain: Ints32, heads: Ints32, sta
     labels[node] = cost
     bucket = (cost >> ONE_BITS) % len(heads)
     first = heads[bucket]
-    chain[node, NEXT], chain[node, PREVIOUS] = first, NOBODY
-    if first != NOBODY:
+    chain[node, NEXT], chain[node, PREVIOUS] = first, NO_CELL
+    if first != NO_CELL:
         chain[first, PREVIOUS] = node
     heads[bucket] = node
     state[WAITING] += 1
@@ -113,9 +113,9 @@ def _reach(node: int, cost: int, labels: Ints, chain: Ints32, heads: Ints32, sta
 def _leave(node: int, labels: Ints, chain: Ints32, heads: Ints32, state: Ints) -> None:
     """Take a cell out of its bucket."""
     after, before = chain[node, NEXT], chain[node, PREVIOUS]
-    if after != NOBODY:
+    if after != NO_CELL:
         chain[after, PREVIOUS] = before
-    if before != NOBODY:
+    if before != NO_CELL:
         chain[before, NEXT] = after
     else:
         heads[(labels[node] >> ONE_BITS) % len(heads)] = after

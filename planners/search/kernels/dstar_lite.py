@@ -26,11 +26,20 @@ from numba import njit
 
 from groundmap.arrays import Bytes, Ints
 from planners.costmap.kernels.moves import COLS, ROWS
-from planners.search.kernels.astar import FAR, estimate
+from planners.search.kernels.astar import (
+    BEST,
+    EXHAUSTED,
+    EXPANDED,
+    FAR,
+    FOUND,
+    HEAP_FULL,
+    SIZE,
+    SLICE_DONE,
+    estimate,
+)
 from planners.search.kernels.heap import TIE_SHIFT, drop_top, push, replace_top, top_node
 
-SLICE_DONE, DONE, HEAP_FULL = range(3)  # what `advance` returns
-SIZE, BEST, SHIFT, EXPANDED = range(4)  # entries of `state`; SHIFT is the paper's km
+SHIFT = 2  # entry of `state` in place of A*'s target: the paper's km
 G, RHS = range(2)  # columns of `labels`
 LOWER = 1 << TIE_SHIFT  # ties of cells to be lowered begin here; those to be raised have 0
 MOST_TIE = (1 << 52) - 1 - LOWER
@@ -72,11 +81,11 @@ def advance(
     Returns
     -------
     int
-        `DONE` (the best cost is final, `FAR` if there is no route), `SLICE_DONE`, or `HEAP_FULL`
-        (call again with more room).
+        `FOUND` (the best cost is final), `EXHAUSTED` (there is no route), `SLICE_DONE`, or
+        `HEAP_FULL` (call again with more room).
     """
     best = best_of(sources, labels, width)
-    status, taken = DONE, 0
+    status, taken = EXHAUSTED, 0
     while _goes_on(heap, state, best):
         if taken >= budget or state[SIZE] + 9 > len(heap):
             status = SLICE_DONE if taken >= budget else HEAP_FULL
@@ -101,7 +110,7 @@ def advance(
             if _joining_cost(sources, node, width) < FAR:
                 best = best_of(sources, labels, width)
     state[BEST] = best
-    return status
+    return FOUND if status == EXHAUSTED and best < FAR else status
 
 
 @njit(cache=True, nogil=True)

@@ -18,7 +18,17 @@ from groundmap.arrays import Bools, Floats, Ints, Ints32
 from planners.costmap.kernels.moves import ONE
 from planners.geometry.kernels.curves import SEGMENTS, along, wrap
 from planners.geometry.kernels.swept_footprint import Ground, Shape, cuts, motion_clear
-from planners.search.kernels.astar import FAR
+from planners.search.kernels.astar import (
+    BEST,
+    EXHAUSTED,
+    EXPANDED,
+    FAR,
+    FOUND,
+    HEAP_FULL,
+    SIZE,
+    SLICE_DONE,
+    TARGET,
+)
 from planners.search.kernels.heap import drop_top, push, top_node
 from planners.search.kernels.hybrid_field import SIDE, UNREACHED, Field, distance_of
 from planners.search.kernels.hybrid_motion import (
@@ -35,9 +45,7 @@ from planners.search.kernels.hybrid_motion import (
     steering,
 )
 
-SLICE_DONE, FOUND, EXHAUSTED, FULL = range(4)  # what `advance` returns
-SIZE, COUNT, EXPANDED, WAIT, BEST, LAST = range(6)  # entries of `state`
-STATE_SIZE = 6
+COUNT, WAIT, STATE_SIZE = 4, 5, 6  # entries of `state` after those of A*, and its length
 MOST = 2.0**30  # [cells] of a cost as a key
 HASH = 0x9E3779B97F4A7C15 - 2**64  # odd; the golden ratio spreads keys that are close together
 
@@ -86,7 +94,7 @@ def begin(
         Both within the map.
     """
     state = np.zeros(STATE_SIZE, dtype=np.int64)
-    state[BEST], state[LAST] = FAR, -1
+    state[BEST], state[TARGET] = FAR, -1
     nodes.table[:] = -1
     row, col = math.floor(start[1]), math.floor(start[0])
     far = distance_of(field, ground.blocked.shape[1], row * ground.blocked.shape[1] + col)
@@ -122,7 +130,7 @@ def advance(
     Returns
     -------
     int
-        `FOUND`, `EXHAUSTED`, `SLICE_DONE`, or `FULL` (call again with more room).
+        `FOUND`, `EXHAUSTED`, `SLICE_DONE`, or `HEAP_FULL` (call again with more room).
     """
     end, motions = state[EXPANDED] + budget, TURNS * drive.gears
     while state[SIZE] > 0 and heap[0, 0] < state[BEST]:
@@ -133,7 +141,7 @@ def advance(
             or state[COUNT] + motions > len(nodes.costs)
             or 2 * (state[COUNT] + motions) > len(nodes.table)
         ):
-            return FULL
+            return HEAP_FULL
         node = top_node(heap)
         state[SIZE] = drop_top(heap, state[SIZE])
         if nodes.closed[node]:  # it came out before, at a lower cost
@@ -260,7 +268,7 @@ def _shoot(
             )
             x, y, yaw = along(x, y, yaw, curvature, length / count)
     if total * ONE < state[BEST]:
-        state[BEST], state[LAST] = key_of(total), node
+        state[BEST], state[TARGET] = key_of(total), node
         shot.lengths[:], shot.turns[:] = lengths, turns
 
 

@@ -22,17 +22,23 @@ from numba import njit
 
 from groundmap.arrays import Ints
 from planners.costmap.kernels.moves import ONE
-from planners.search.kernels.astar import EXHAUSTED, FAR, FOUND, HEAP_FULL, SLICE_DONE
+from planners.search.kernels.astar import (
+    BEST,
+    EXHAUSTED,
+    EXPANDED,
+    FAR,
+    FOUND,
+    HEAP_FULL,
+    SIZE,
+    SLICE_DONE,
+)
 from planners.search.kernels.heap import drop_top, push, top_node
 from planners.search.kernels.polyanya_bound import away, through
 from planners.search.kernels.polyanya_expand import from_interval, from_point
 from planners.search.kernels.polyanya_jit import borrowing
 from planners.search.kernels.polyanya_nodes import (
-    BEST,
     COUNT,
-    EXPANDED,
     SCALE,
-    SIZE,
     SOFAR,
     PolyanyaQuery,
     Polygons,
@@ -54,8 +60,8 @@ def advance(
     query : PolyanyaQuery
     pool : Pool
     state : ndarray of int64, shape (6,)
-        Heap size, nodes made, nodes expanded, least total cost (as a key), the last root on its
-        line, and its target.
+        Heap size, least total cost as a key, its target, number of expanded nodes, number of
+        nodes made, the last root on the best line.
     spare : int
         Nodes that one expansion makes at most.
     budget : int

@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from groundmap.arrays import Bools, Bytes, Floats, Ints
+from planners.search.kernels.astar import BEST, TARGET
 from planners.search.kernels.polyanya_bound import away
 from planners.search.kernels.polyanya_jit import borrowing
 
 SCALE = 2.0**36  # a cell's side in heap keys
 SOFAR = 4  # column of `cones`
-SIZE, COUNT, EXPANDED, BEST, LAST, TARGET = range(6)  # entries of `state`
+COUNT, LAST = 4, 5  # entries of `state` after those of A*
 SAME = 1e-13  # lengths are the same that differ by no more than this share and as many cells
 
 
