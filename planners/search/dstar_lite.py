@@ -137,7 +137,7 @@ class DStarLite(CostmapSearch):
             self.heap = enlarge(self.heap, by=len(self.heap) + entries)
 
     def _move(self, shape: tuple[int, ...], offset: Ints) -> None:
-        """Move labels, heap entries and ends to their cells in a window that grew, shrank or moved."""
+        """Renumber the cells for a window that grew, shrank or moved."""
         width = self.costmap.width
         labels = self.labels.reshape(*self.costmap.traversable.shape, 2)
         self.labels = _reshape(labels, (*shape, 2), offset, FAR).reshape(-1, 2)

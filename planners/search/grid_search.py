@@ -112,8 +112,7 @@ class GridSearch(ABC):
 
     def _direct_result(self, query: GridQuery) -> SearchResult:
         """Return the straight piece from start to goal."""
-        waypoints = self._line(query, query.ends.sources[:0, :-1])
-        return SearchResult(waypoints, 0, cost=length_of(waypoints))
+        return SearchResult(self._line(query, query.ends.sources[:0, :-1]), 0)
 
     def _to_result(self, query: GridQuery) -> SearchResult:
         waypoints = self._line(query, self._trace())

@@ -28,7 +28,7 @@ from planners.search.kernels.hybrid_astar import (
     advance,
     begin,
     drive_along,
-    refile,
+    rebuild_table,
 )
 from planners.search.kernels.hybrid_field import seed_field
 from planners.search.kernels.hybrid_motion import ROOT, Drive, Prices, pieces, reach, steering
@@ -205,7 +205,7 @@ class HybridAStar:
             self.nodes = empty_nodes(2 * len(smaller.costs))
             for name in Nodes._fields[:-1]:
                 getattr(self.nodes, name)[:count] = getattr(smaller, name)[:count]
-            refile(self.nodes, count)
+            rebuild_table(self.nodes, count)
         return status
 
     def _motions(self, drive: Drive, node: int, shot: Shot) -> tuple[Floats, Floats]:
