@@ -98,7 +98,7 @@ def plan_many(
         raise ProblemError("audit", "True or False", repr(audit))
     chosen = get_planner(planner)
     options = chosen.settings(**settings)
-    headings = chosen.headings and options.heeds_headings(problem)
+    headings = chosen.headings and options.uses_headings(problem)
     posed = (("start",) if options.takes_other_goals else ("start", "goal")) if headings else ()
     problems = _problems(problem, pairs, posed=posed)
     workers = min(_threads(threads), max(len(problems), 1))
@@ -181,7 +181,7 @@ def _route(workspace: _Workspace, engine: Engine, problem: PlanningProblem) -> R
         engine,
         workspace.settings,
         began=began,
-        headings=workspace.headings and workspace.settings.heeds_headings(problem),
+        headings=workspace.headings and workspace.settings.uses_headings(problem),
         audited=workspace.audited,
         watch=workspace.watch,
     )

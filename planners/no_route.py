@@ -15,7 +15,7 @@ from planners.error_messages import Place, Point, Turning
 from planners.errors import EnclosedError
 from planners.problem.footprint import Footprint
 from planners.problem.problem import PlanningProblem
-from planners.search.widest_path import LATTICE_SLACK, WidestRoute, widest_way
+from planners.search.widest_path import LATTICE_SLACK, WidestRoute, widest_path
 
 
 def explain_no_route(space: MapSpace, *, headings: bool = False) -> EnclosedError:
@@ -88,7 +88,7 @@ def widest_route(problem: PlanningProblem) -> WidestRoute:
     """
     point = replace(problem, footprint=Footprint.of(0.0), clear_start_radius=problem.clear_radius)
     costmap = costmap_of(point)
-    widest = widest_way(costmap)
+    widest = widest_path(costmap)
     if widest is None:
         raise explain_no_route(costmap)
     return widest
@@ -98,7 +98,7 @@ def _widest(space: MapSpace, place: Place) -> tuple[float, Point | None]:
     """Return width and bottleneck of the widest passage; NaN and None on a 3-D map."""
     if not isinstance(space, Costmap):
         return math.nan, None
-    widest = widest_way(space, seen_from=place)
+    widest = widest_path(space, seen_from=place)
     return (0.0, None) if widest is None else (widest.width, widest.bottleneck)
 
 

@@ -74,7 +74,7 @@ def plan(
     check_on_map(problem, goal=not chosen.takes_other_goals)
     space = space_of(problem)
     engine = make_engine(space, planner)
-    headings = entry.headings and chosen.heeds_headings(problem)
+    headings = entry.headings and chosen.uses_headings(problem)
     return solve(space, engine, chosen, began=began, headings=headings, watch=watch)
 
 

@@ -142,7 +142,7 @@ def test_planners_that_cannot_weigh_cells_refuse_to(planner: str) -> None:
         footprint=1.0,
         costs=CostSettings(clearance_weight=1.0),
     )
-    with pytest.raises(ProblemError, match=r"uniform costs, .* Take 'astar'"):
+    with pytest.raises(ProblemError, match=r"uniform costs, .* Use 'astar'"):
         plan(problem, planner)
 
 

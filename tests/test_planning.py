@@ -26,7 +26,7 @@ from planners import (
     plan,
 )
 from planners.costmap.costmap import Costmap
-from planners.search.widest_path import widest_way
+from planners.search.widest_path import widest_path
 
 FIELD = grid_of(free_field(64, 64))
 
@@ -194,7 +194,7 @@ def test_the_end_with_less_room_is_enclosed() -> None:
 
 
 @pytest.mark.parametrize("gap", [1, 2, 3])
-def test_the_widest_way_is_as_wide_as_the_gap(gap: int) -> None:
+def test_the_widest_path_is_as_wide_as_the_gap(gap: int) -> None:
     sentence = rf"{gap * 0.5:.2f} m wide at \(14.50, 16.\d+\); the footprint needs {gap + 1}"
     with pytest.raises(EnclosedError, match=sentence) as caught:
         plan(into_the_pocket(gap=gap, footprint=(gap + 1) / 2))
@@ -217,7 +217,7 @@ def into_the_pocket(*, gap: int, footprint: float) -> PlanningProblem:
 
 @given(masks(side=6), st.floats(0.05, 1.2), st.data())
 @settings(max_examples=60)
-def test_no_footprint_wider_than_the_widest_way_gets_through(
+def test_no_footprint_wider_than_the_widest_path_gets_through(
     blocked: Bools, radius: float, data: st.DataObject
 ) -> None:
     wide = np.kron(blocked, np.ones((3, 3))) > 0
@@ -227,7 +227,7 @@ def test_no_footprint_wider_than_the_widest_way_gets_through(
     start, goal = (cell + data.draw(st.sampled_from([0.25, 0.5, 0.8])) for cell in cells)
     grid = grid_of(np.where(wide, BLOCKED, FREE))
     asked = problem(grid, start=start, goal=goal, footprint=radius, clear_start=False)
-    way = widest_way(Costmap.of(asked))
+    way = widest_path(Costmap.of(asked))
     try:
         route = plan(asked)
     except NoRouteError:

@@ -67,7 +67,7 @@ def solve(
         raise explain_no_route(space, headings=headings)
     if result.goal is not None:
         axes = len(problem.goal_xy)
-        if audited and not settings.will_do(result.goal, goal, axes=axes):
+        if audited and not settings.accepts_end(result.goal, goal, axes=axes):
             off = math.dist(result.goal[:axes], problem.goal_xy)
             raise AuditError("does not end at a goal", result.goal[:axes], got=off, needed=0.0)
         space = space.with_problem(

@@ -176,7 +176,7 @@ class SamplingPlanner:
         )
         axes = validator.axes
         place = start[:axes] if validator.space in FLAT else start
-        if settings.takes_other_goals and settings.will_do(place, goal, axes=axes):
+        if settings.takes_other_goals and settings.accepts_end(place, goal, axes=axes):
             goals = [begin]
         if not goals and settings.takes_other_goals:
             if not goal_states(validator, settings, goal, settings.seed):

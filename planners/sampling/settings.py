@@ -93,7 +93,7 @@ class SamplingSettings(OmplParameters, SearchSettings):
             raise PydanticCustomError("places", "a list of places, such as [[3, 4], [5, 6]]")
         return [tuple(one) for one in goals]
 
-    def heeds_headings(self, problem: PlanningProblem) -> bool:
+    def uses_headings(self, problem: PlanningProblem) -> bool:
         """Whether the state space of a problem has a yaw."""
         start, goal = tuple(map(float, problem.start)), tuple(map(float, problem.goal))
         return self.space_for(problem.shape, start, goal, axes=problem.grid.ndim) not in FLAT
@@ -103,7 +103,7 @@ class SamplingSettings(OmplParameters, SearchSettings):
         """Whether a route may end elsewhere than at the problem's goal."""
         return bool(self.goals) or self.goal_radius > 0 or self.goal_yaw_tolerance > 0
 
-    def will_do(self, end: Pose, goal: Pose, *, axes: int) -> bool:
+    def accepts_end(self, end: Pose, goal: Pose, *, axes: int) -> bool:
         """Whether a pose is within the tolerances of the goal or of an alternative goal.
 
         Parameters

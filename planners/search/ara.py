@@ -1,22 +1,18 @@
-"""ARA*: a route soon, better ones while time remains, and how far from the best each may be."""
+"""ARA*: a first route soon, better ones while time remains, each with a bound on its cost."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from groundmap.arrays import Floats, Ints
 from planners.costmap.costmap import Costmap
-from planners.costmap.endpoints import Ends, ends_of, waypoints_through
-from planners.costmap.kernels.moves import ONE
 from planners.geometry.polyline import length_of
 from planners.problem.problem import Pose
 from planners.search.base import (
-    SLICE,
     Cancel,
     Clock,
     Improvement,
@@ -24,41 +20,45 @@ from planners.search.base import (
     SearchResult,
     SearchSettings,
 )
-from planners.search.kernels.ara import (
-    DONE,
-    HEAP_FULL,
+from planners.search.grid_search import CostmapSearch, GridQuery, kernel_arrays
+from planners.search.kernels.ara import WAITS, advance, least_total, reopen, settle
+from planners.search.kernels.astar import (
+    BEST,
+    EXHAUSTED,
+    EXPANDED,
+    FAR,
+    FOUND,
+    MARK,
+    ROOT,
+    SIZE,
     SLICE_DONE,
-    WAITS,
-    advance,
-    least_total,
-    reopen,
-    settle,
+    TARGET,
+    UNIT,
+    seed,
+    trace,
 )
-from planners.search.kernels.astar import BEST, EXPANDED, FAR, MARK, ROOT, SIZE, TARGET, UNIT, trace
-
-FIRST_ROOM = 1 << 14  # heap entries to begin with
 
 
 class ARASettings(SearchSettings):
-    """What ARA* can be told."""
+    """Settings of ARA*."""
 
     first_weight: float = Field(
         3.0, ge=1, le=10, description="the first route costs at most this many times the least"
     )
     step: float = Field(
-        0.5, ge=0.01, le=10, description="how far below the bound reached the next weight lies"
+        0.5, ge=0.01, le=10, description="difference between a bound and the next weight"
     )
     final_bound: float = Field(
         1.0, ge=1, le=10, description="stop when a route costs at most this many times the least"
     )
 
 
-class ARA:
+class ARA(CostmapSearch):
     """Anytime repairing A* (Likhachev, Gordon, Thrun 2003).
 
-    Weighted A* again and again with falling weights. An iteration expands no cell twice: cells
-    that it reaches at a lower cost after they were expanded wait for the next, which begins with
-    these and with all that was waiting anyway; nothing is searched from scratch.
+    Weighted A* is repeated with decreasing weights. An iteration expands no cell twice: cells that
+    it reaches at a lower cost after their expansion wait for the next iteration, which starts from
+    these and from all others that wait. Nothing is searched from scratch.
 
     Examples
     --------
@@ -70,21 +70,19 @@ class ARA:
     >>> problem = PlanningProblem(grid, start=(9.5, 30.5), goal=(50.5, 30.5), footprint=2.0)
     >>> ara = ARA(Costmap.of(problem))
     >>> costs = []
-    >>> found = ara.search(problem.start, problem.goal, ARASettings(),
-    ...                    on_improved=lambda better: costs.append(round(better.cost, 2)))
-    >>> found.bound, costs == sorted(costs, reverse=True), costs[-1] == round(found.cost, 2)
+    >>> result = ara.search(problem.start, problem.goal, ARASettings(),
+    ...                     on_improved=lambda better: costs.append(round(better.cost, 2)))
+    >>> result.bound, costs == sorted(costs, reverse=True), costs[-1] == round(result.cost, 2)
     (1.0, True, True)
     """
 
-    name: ClassVar[str] = "ara"
+    name = "ara"
 
     def __init__(self, costmap: Costmap) -> None:
-        self.costmap = costmap
-        self.moves, self.costs = costmap.moves.ravel(), costmap.costs.ravel()
+        super().__init__(costmap)
+        self.arrays = kernel_arrays(costmap)
         self.labels = np.zeros((costmap.blocked.size, 2), dtype=np.int64)
-        self.first = self.turn = 0
-        self.heap = np.empty((FIRST_ROOM, 2), dtype=np.int64)
-        self.state = np.zeros(4, dtype=np.int64)
+        self.first = self.turn = self.weight = 0
 
     def search(
         self,
@@ -100,20 +98,20 @@ class ARA:
         Parameters
         ----------
         start, goal : tuple of float
-            x and y [m, map]; what follows is ignored.
+            x and y [m, map]; the rest is ignored.
         settings : ARASettings
         on_improved : callable, optional
-            Called with every `Improvement`: costs never rise and bounds fall; the last is what
-            `search` returns. If it returns True, the search ends with that route.
+            Called with every `Improvement`: costs never rise and bounds fall; the last one is the
+            result of `search`. If it returns True, the search ends with that route.
         cancel : Cancel, optional
             Such as a `threading.Event`: once set, the search ends with the best route so far.
 
         Raises
         ------
         TimeLimitError
-            Time ran out before there was a first route; with a limit of 0, always.
+            The time limit is exceeded before the first route; with a limit of 0, always.
         CancelledError
-            Likewise.
+            The search is cancelled before the first route.
         """
         clock = Clock(self.name, settings.time_limit, cancel)
         clock.check(0)
@@ -131,102 +129,92 @@ class ARA:
     def _improvements(
         self, start: Pose, goal: Pose, settings: ARASettings, clock: Clock
     ) -> Iterator[Improvement]:
-        """Yield routes, each with a smaller bound, until one is the best or time is up."""
-        ends = ends_of(self.costmap, start, goal)
-        if ends.direct:
-            waypoints = waypoints_through(self.costmap, start, goal, np.empty((0, 2), int))
+        """Yield routes of decreasing bounds until one is optimal or time is up."""
+        query = GridQuery(start, goal, self._join(start, goal), settings)
+        if query.ends.direct:
+            waypoints = self._direct_result(query).waypoints
             yield Improvement(length_of(waypoints), 1.0, clock.seconds, waypoints)
             return
-        self._seed(ends)
-        weight, last = _scale(settings.first_weight), _scale(settings.final_bound)
+        self._seed(query)
+        last = _scale(settings.final_bound)
         best: Improvement | None = None
-        least, status = 1.0, DONE
-        while status == DONE:
-            status = self._iterate(ends, weight, clock)
+        least, finished = 1.0, True
+        while finished:
+            finished = self._iterate(query, clock)
             total = int(self.state[BEST])
             if total == FAR:
-                if status != DONE:
+                if not finished:
                     clock.check(int(self.state[EXPANDED]))
                 return
-            least = max(least, self._least_total(ends))
+            least = max(least, self._least_total(query.ends.targets))
             bound = max(total / least, 1.0)
-            if status == DONE:  # then the weight is a bound, too
-                least, bound = max(least, total * UNIT / weight), min(bound, weight / UNIT)
+            if finished:  # then the weight is a bound, too
+                least, bound = (
+                    max(least, total * UNIT / self.weight),
+                    min(bound, self.weight / UNIT),
+                )
             if best is None or bound < best.bound:
-                cost, waypoints = self._route(start, goal)
-                # A shortened end may have made the route before the shorter one.
+                cost, waypoints = self._route(query)
+                # A shortened end piece may have made the previous route the shorter one.
                 if best is not None and best.cost <= cost:
                     cost, waypoints = best.cost, best.waypoints
                 best = Improvement(cost, bound, clock.seconds, waypoints)
                 yield best
-            if weight <= last:
+            if self.weight <= last:
                 return
-            weight = max(last, _scale(bound - settings.step))
+            self.weight = max(last, _scale(bound - settings.step))
 
-    def _seed(self, ends: Ends) -> None:
-        """Begin a query: the sources wait."""
-        self.turn += 1
-        self.first = self.turn
-        self.state[:] = 0, FAR, -1, 0
-        for row, col, cost in ends.sources.tolist():
-            node = row * self.costmap.width + col
-            self.labels[node] = cost, MARK * self.first + WAITS + ROOT
-            self.heap[self.state[SIZE]] = 0, node  # keyed by `reopen`
-            self.state[SIZE] += 1
+    def _seed(self, query: GridQuery) -> None:
+        self.weight = _scale(query.settings.first_weight)
+        self.first = self.turn = self.turn + 1
+        mark, width = MARK * self.first + WAITS + ROOT, self.costmap.width
+        size = seed(*query.ends[:2], self.weight, width, mark, self.labels, self.heap)
+        self.state[:] = size, FAR, -1, 0
 
-    def _iterate(self, ends: Ends, weight: int, clock: Clock) -> int:
+    def _iterate(self, query: GridQuery, clock: Clock) -> bool:
         """Search until the best route costs at most weight / `UNIT` times the least, or time is up.
 
         Returns
         -------
-        int
-            `DONE` or `SLICE_DONE`.
+        bool
+            False if time is up.
         """
-        width, targets = self.costmap.width, ends.targets
-        reopen(width, targets, weight, self.labels, self.turn + 1, self.heap, self.state)
+        (_, costs, steps, width), targets = self.arrays, query.ends.targets
+        reopen(width, targets, self.weight, self.labels, self.turn + 1, self.heap, self.state)
         self.turn += 2
         status = SLICE_DONE
-        while status != DONE and not clock.is_up:
-            status = self._advance(targets, weight)
-        settle(self.costs, self.costmap.steps, width, targets, self.labels, self.first, self.state)
-        return DONE if status == DONE else SLICE_DONE
+        while status not in (FOUND, EXHAUSTED) and not clock.is_up:
+            status = self._search_slice(query)
+        settle(costs, steps, width, targets, self.labels, self.first, self.state)
+        return status in (FOUND, EXHAUSTED)
 
-    def _advance(self, targets: Ints, weight: int) -> int:
-        status = advance(
-            self.moves,
-            self.costs,
-            self.costmap.steps,
-            self.costmap.width,
-            targets,
-            weight,
+    def _advance(self, query: GridQuery) -> int:
+        return advance(
+            *self.arrays,
+            query.ends.targets,
+            self.weight,
             self.labels,
             self.first,
             self.turn,
             self.heap,
             self.state,
-            SLICE,
+            self.slice_size,
         )
-        if status == HEAP_FULL:
-            self.heap = np.concatenate([self.heap, np.empty_like(self.heap)])
-        return status
 
-    def _least_total(self, ends: Ends) -> int:
-        """Return what no route costs less than, unless the best does."""
+    def _least_total(self, targets: Ints) -> int:
+        """Return a cost that no route falls below, unless the best one does."""
         width, size = self.costmap.width, self.state[SIZE]
-        least = least_total(width, ends.targets, self.labels, self.heap, size)
-        return min(least, int(self.state[BEST]))
+        return min(least_total(width, targets, self.labels, self.heap, size), int(self.state[BEST]))
 
-    def _route(self, start: Pose, goal: Pose) -> tuple[float, Floats]:
-        """Return the best route's cost and waypoints [m, map]."""
-        turns = trace(self.labels, self.costmap.width, int(self.state[TARGET]))[::-1]
-        cells = np.column_stack(np.divmod(turns, self.costmap.width))
-        waypoints = waypoints_through(self.costmap, start, goal, cells)
-        # Where all metres are alike, the line's own length: merging end pieces may shorten it.
-        if self.costmap.uniform:
-            return length_of(waypoints), waypoints
-        return float(self.state[BEST]) / ONE * self.costmap.window.resolution, waypoints
+    def _route(self, query: GridQuery) -> tuple[float, Floats]:
+        """Return the best route's cost [m] and waypoints [m, map]."""
+        waypoints = self._line(query, self._trace())
+        return self._cost(waypoints), waypoints
+
+    def _trace(self) -> Ints:
+        return self._cells(trace(self.labels, self.costmap.width, int(self.state[TARGET]))[::-1])
 
 
 def _scale(weight: float) -> int:
-    """Return a weight in 1/256, not above what was asked for."""
+    """Return a weight in 1/256, rounded down."""
     return math.floor(weight * UNIT)

@@ -1,63 +1,40 @@
-"""A*, and what differs from it by a weight: Dijkstra's search and weighted A*."""
+"""A*, and two searches that differ from it by a weight: Dijkstra's and weighted A*."""
 
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import Any
 
 import numpy as np
 from pydantic import Field
 
 from groundmap.arrays import Ints
 from planners.costmap.costmap import Costmap
-from planners.costmap.endpoints import ends_of, waypoints_through
-from planners.costmap.kernels.moves import ONE
-from planners.geometry.polyline import length_of
-from planners.problem.problem import Pose
-from planners.search.base import SLICE, Clock, SearchResult, SearchSettings
-from planners.search.kernels.astar import (
-    BEST,
-    EXHAUSTED,
-    EXPANDED,
-    FAR,
-    FOUND,
-    HEAP_FULL,
-    MARK,
-    ROOT,
-    SIZE,
-    TARGET,
-    UNIT,
-    advance,
-    estimate,
-    inflate,
-    trace,
-)
-from planners.search.kernels.heap import push
-
-FIRST_ROOM = 1 << 14  # heap entries to begin with
+from planners.search.base import SearchSettings
+from planners.search.grid_search import CostmapSearch, GridQuery, kernel_arrays
+from planners.search.kernels.astar import FAR, MARK, ROOT, TARGET, UNIT, advance, seed, trace
 
 
 class AStarSettings(SearchSettings):
-    """What A* can be told."""
+    """Settings of A*."""
 
 
 class DijkstraSettings(SearchSettings):
-    """What Dijkstra's search can be told."""
+    """Settings of Dijkstra's search."""
 
 
 class WeightedAStarSettings(SearchSettings):
-    """What weighted A* can be told."""
+    """Settings of weighted A*."""
 
     weight: float = Field(
         1.5, ge=1, le=10, description="a route costs at most this many times the least"
     )
 
 
-class AStar:
+class AStar(CostmapSearch):
     """A* over orthogonal and diagonal moves between cell centres (Hart, Nilsson, Raphael 1968).
 
-    Start and goal are joined to the centres around them by straight pieces. Arrays are allocated
-    once, and never cleared.
+    Start and goal are joined to the centres around them by straight pieces.
 
     Examples
     --------
@@ -71,89 +48,51 @@ class AStar:
     [[5.5, 5.5], [8.5, 8.5], [9.5, 8.5]]
     """
 
-    name: ClassVar[str] = "astar"
+    name = "astar"
 
     def __init__(self, costmap: Costmap) -> None:
-        cells = costmap.blocked.size
-        self.costmap = costmap
-        self.moves, self.costs = costmap.moves.ravel(), costmap.costs.ravel()
-        self.labels = np.zeros((cells, 2), dtype=np.int64)
-        self.query = 0
-        self.heap = np.empty((FIRST_ROOM, 2), dtype=np.int64)
+        super().__init__(costmap)
+        self.arrays = kernel_arrays(costmap)
+        self.labels = np.zeros((costmap.blocked.size, 2), dtype=np.int64)
+        self.queries = 0
 
     def weight(self, settings: SearchSettings) -> float:
-        """Return how much more than itself the estimate counts."""
+        """Return the factor by which the estimate is multiplied."""
         return 1.0
 
-    def search(self, start: Pose, goal: Pose, settings: SearchSettings) -> SearchResult | None:
-        """Return the route of least cost from start to goal, or None if there is none.
+    def _bound(self, settings: Any) -> float:
+        return max(self.weight(settings), 1.0)
 
-        Raises
-        ------
-        TimeLimitError
-            Time ran out; with a limit of 0, always.
-        """
-        clock = Clock(self.name, settings.time_limit)
-        clock.check(0)
-        weight = self.weight(settings)
-        ends = ends_of(self.costmap, start, goal)
-        if ends.direct:
-            return SearchResult(
-                waypoints_through(self.costmap, start, goal, np.empty((0, 2), int)), 0
-            )
-        scaled = round(weight * UNIT)
-        state = self._seed(ends.sources, ends.targets, scaled)
-        status = -1
-        while status not in (FOUND, EXHAUSTED):
-            clock.check(int(state[EXPANDED]))
-            status = self._advance(ends.targets, scaled, state)
-        if status == EXHAUSTED:
-            return None
-        turns = trace(self.labels, self.costmap.width, int(state[TARGET]))[::-1]
-        cells = np.column_stack(np.divmod(turns, self.costmap.width))
-        waypoints = waypoints_through(self.costmap, start, goal, cells)
-        cost = float(state[BEST]) / ONE * self.costmap.window.resolution
-        # Where all metres are alike, the line's own length: merging end pieces may shorten it.
-        cost = length_of(waypoints) if self.costmap.uniform else cost
-        return SearchResult(waypoints, int(state[EXPANDED]), bound=max(weight, 1.0), cost=cost)
+    def _seed(self, query: GridQuery) -> None:
+        self.queries += 1
+        mark, weight = MARK * self.queries + ROOT, round(self.weight(query.settings) * UNIT)
+        width = self.costmap.width
+        size = seed(*query.ends[:2], weight, width, mark, self.labels, self.heap)
+        self.state = np.array([size, FAR, -1, 0], dtype=np.int64)
 
-    def _seed(self, sources: Ints, targets: Ints, weight: int) -> Ints:
-        """Begin a query: put the sources on an empty heap."""
-        self.query += 1
-        state = np.array([0, FAR, -1, 0], dtype=np.int64)
-        for row, col, cost in sources.tolist():
-            node = row * self.costmap.width + col
-            self.labels[node] = cost, MARK * self.query + ROOT
-            h = inflate(estimate(row, col, targets), weight)
-            state[SIZE] = push(self.heap, state[SIZE], cost + h, h, node)
-        return state
-
-    def _advance(self, targets: Ints, weight: int, state: Ints) -> int:
-        status = advance(
-            self.moves,
-            self.costs,
-            self.costmap.steps,
-            self.costmap.width,
-            targets,
-            weight,
+    def _advance(self, query: GridQuery) -> int:
+        return advance(
+            *self.arrays,
+            query.ends.targets,
+            round(self.weight(query.settings) * UNIT),
             self.labels,
-            self.query,
+            self.queries,
             self.heap,
-            state,
-            SLICE,
+            self.state,
+            self.slice_size,
         )
-        if status == HEAP_FULL:
-            self.heap = np.concatenate([self.heap, np.empty_like(self.heap)])
-        return status
+
+    def _trace(self) -> Ints:
+        return self._cells(trace(self.labels, self.costmap.width, int(self.state[TARGET]))[::-1])
 
 
 class Dijkstra(AStar):
-    """Dijkstra's search: A* without an estimate, to compare with."""
+    """Dijkstra's search: A* without an estimate, for comparison."""
 
     name = "dijkstra"
 
     def weight(self, settings: SearchSettings) -> float:
-        """Return 0: the estimate doesn't count."""
+        """Return 0: no estimate is used."""
         return 0.0
 
 
@@ -163,6 +102,6 @@ class WeightedAStar(AStar):
     name = "weighted_astar"
 
     def weight(self, settings: SearchSettings) -> float:
-        """Return the weight that was asked for, up to 1/256."""
+        """Return the weight of the settings, rounded down to a multiple of 1/256."""
         assert isinstance(settings, WeightedAStarSettings)
         return math.floor(settings.weight * UNIT) / UNIT

@@ -4,46 +4,36 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import ClassVar
 
 import numpy as np
 
 from groundmap.arrays import Floats, Ints
-from planners.costmap.endpoints import centres_around
+from planners.costmap.endpoints import Ends, centres_around
 from planners.costmap.kernels.moves import ONE
 from planners.costmap.voxel_map import Voxels
 from planners.geometry.kernels.clearance3d import segment_clearance
-from planners.geometry.polyline import SAME, length_of
+from planners.geometry.polyline import SAME
 from planners.geometry.rounding import rounding_at
 from planners.problem.problem import Pose
-from planners.search.base import SLICE, Clock, SearchResult, SearchSettings
-from planners.search.kernels.astar import EXHAUSTED, FAR, FOUND, HEAP_FULL
-from planners.search.kernels.astar3d import (
-    EXPANDED,
-    MARK,
-    ROOT,
-    SIZE,
-    TARGET,
-    advance,
-    estimate,
-    plates_of,
-    trace,
-)
-from planners.search.kernels.heap import push
-
-FIRST_ROOM = 1 << 14  # heap entries to begin with
+from planners.search.grid_search import GridQuery, GridSearch
+from planners.search.kernels.astar import FAR, TARGET
+from planners.search.kernels.astar3d import MARK, ROOT, advance, plates_of, seed, trace
 
 
-class AStar3D:
+class AStar3D(GridSearch):
     """A* over the 26 moves between voxel centres; every voxel of a move's box must be free.
 
-    Start and goal are joined to the up to eight centres around them by straight pieces. Arrays
-    are allocated once, and never cleared.
+    Start and goal are joined to the up to eight centres around them by straight pieces.
+
+    Parameters
+    ----------
+    voxels : Voxels
 
     Examples
     --------
     >>> from groundmap import ConfidenceGrid
     >>> from planners.problem.problem import PlanningProblem
+    >>> from planners.search.base import SearchSettings
     >>> grid = ConfidenceGrid(resolution=1.0, origin=(0, 0, 0))
     >>> grid.fuse(np.array([0, 0, 0]), np.full((16, 16, 16), -1.0, dtype=np.float32))
     >>> problem = PlanningProblem(grid, start=(3.5, 3.5, 3.5), goal=(9.5, 7.5, 5.5), footprint=2)
@@ -52,84 +42,57 @@ class AStar3D:
     [[3.5, 3.5, 3.5], [5.5, 5.5, 5.5], [7.5, 7.5, 5.5], [9.5, 7.5, 5.5]]
     """
 
-    name: ClassVar[str] = "astar"
+    name = "astar"
 
     def __init__(self, voxels: Voxels) -> None:
+        super().__init__()
         self.voxels = voxels
         self.traversable = np.pad(voxels.traversable, 1)  # so that no move leaves the arrays
         _, rows, self.width = self.traversable.shape
         self.slab = rows * self.width
         self.plates = plates_of(self.traversable)
         self.labels = np.zeros((self.traversable.size, 2), dtype=np.int64)
-        self.query = 0
-        self.heap = np.empty((FIRST_ROOM, 2), dtype=np.int64)
+        self.queries = 0
 
-    def search(self, start: Pose, goal: Pose, settings: SearchSettings) -> SearchResult | None:
-        """Return the shortest route from start to goal, or None if there is none.
-
-        Parameters
-        ----------
-        start, goal : tuple of float
-            x, y and z [m, map]; what follows is ignored.
-        settings : SearchSettings
-
-        Raises
-        ------
-        TimeLimitError
-            Time ran out; with a limit of 0, always.
-        """
-        clock = Clock(self.name, settings.time_limit)
-        clock.check(0)
+    def _join(self, start: Pose, goal: Pose) -> Ends:
         a, b = self.voxels.to_cells([start[:3], goal[:3]])
-        if self._is_clear(a, b):
-            return _to_result(np.array([start[:3], goal[:3]]), 0)
-        sources, targets = self._join(start), self._join(goal)
+        direct = self._is_clear(a, b)
+        sources, targets = (self._voxels_around(place) for place in (start, goal))
         if len(sources) == 0 or len(targets) == 0:
-            return None
-        state = self._seed(sources, targets)
-        status = -1
-        while status not in (FOUND, EXHAUSTED):
-            clock.check(int(state[EXPANDED]))
-            status = self._advance(targets, state)
-        if status == EXHAUSTED:
-            return None
-        turns = trace(self.labels, self.width, self.slab, int(state[TARGET]))[::-1]
-        inner = np.column_stack(np.unravel_index(turns, self.traversable.shape)) - 1
-        centres = self.voxels.window.cell_to_world(inner)
-        line = np.concatenate([[start[:3]], centres, [goal[:3]]])
-        return _to_result(_merge_collinear(line), int(state[EXPANDED]))
+            sources, targets = sources[:0], targets[:0]
+        return Ends(sources, targets, direct)
 
-    def _seed(self, sources: Ints, targets: Ints) -> Ints:
-        """Begin a query: put the sources on an empty heap."""
-        self.query += 1
-        state = np.array([0, FAR, -1, 0], dtype=np.int64)
-        for layer, row, col, cost in sources.tolist():
-            node = layer * self.slab + row * self.width + col
-            self.labels[node] = cost, MARK * self.query + ROOT
-            h = estimate(layer, row, col, targets)
-            state[SIZE] = push(self.heap, state[SIZE], cost + h, h, node)
-        return state
+    def _seed(self, query: GridQuery) -> None:
+        self.queries += 1
+        mark = MARK * self.queries + ROOT
+        size = seed(*query.ends[:2], self.width, self.slab, mark, self.labels, self.heap)
+        self.state = np.array([size, FAR, -1, 0], dtype=np.int64)
 
-    def _advance(self, targets: Ints, state: Ints) -> int:
-        status = advance(
+    def _advance(self, query: GridQuery) -> int:
+        return advance(
             self.plates,
             self.width,
             self.slab,
-            targets,
+            query.ends.targets,
             self.labels,
-            self.query,
+            self.queries,
             self.heap,
-            state,
-            SLICE,
+            self.state,
+            self.slice_size,
         )
-        if status == HEAP_FULL:
-            self.heap = np.concatenate([self.heap, np.empty_like(self.heap)])
-        return status
 
-    def _join(self, place: Pose) -> Ints:
-        """Return layer, row, column of the padded voxels that a place is joined to, and the cost.
+    def _trace(self) -> Ints:
+        turns = trace(self.labels, self.width, self.slab, int(self.state[TARGET]))[::-1]
+        return np.column_stack(np.unravel_index(turns, self.traversable.shape)) - 1
 
-        The place is x, y and z [m, map].
+    def _line(self, query: GridQuery, cells: Ints) -> Floats:
+        centres = self.voxels.window.cell_to_world(cells)
+        return _merge_collinear(np.concatenate([[query.start[:3]], centres, [query.goal[:3]]]))
+
+    def _voxels_around(self, place: Pose) -> Ints:
+        """Return the padded voxels that a place [m, map] is joined to, shape (n, 4).
+
+        Layer, row, column and cost.
         """
         position = self.voxels.to_cells(place[:3])[0]
         near = rounding_at(place[:3]) / self.voxels.window.resolution
@@ -143,7 +106,7 @@ class AStar3D:
         return np.array(rows, dtype=np.int64).reshape(-1, 4)
 
     def _is_clear(self, a: Floats, b: Floats) -> bool:
-        """Whether the straight piece a-b [voxels], within 2 x 2 x 2 voxels, keeps its distance."""
+        """Whether the piece a-b [voxels] spans at most 2 x 2 x 2 voxels and keeps its clearance."""
         low, high = np.floor(np.minimum(a, b)).astype(int), np.floor(np.maximum(a, b)).astype(int)
         blocked = self.voxels.blocked
         if (low < 0).any() or (high[::-1] >= blocked.shape).any() or (high - low > 1).any():
@@ -153,10 +116,6 @@ class AStar3D:
             return False
         need = (self.voxels.radius - self.voxels.slack) / self.voxels.window.resolution
         return need <= 0 or segment_clearance(blocked, a, b, need) >= need
-
-
-def _to_result(waypoints: Floats, expanded: int) -> SearchResult:
-    return SearchResult(waypoints, expanded, cost=length_of(waypoints))
 
 
 def _merge_collinear(points: Floats) -> Floats:
@@ -173,8 +132,8 @@ def _merge_collinear(points: Floats) -> Floats:
 
 def _append(kept: list[Floats], point: Floats) -> None:
     if len(kept) > 1:
-        before, after = kept[-1] - kept[-2], point - kept[-1]
-        if not np.cross(before, after).any() and before @ after > 0:
+        last, step = kept[-1] - kept[-2], point - kept[-1]
+        if not np.cross(last, step).any() and last @ step > 0:
             kept.pop()
     kept.append(point)
 

@@ -1,4 +1,4 @@
-"""The fastest exact planner that a problem allows."""
+"""The fastest optimal planner for a costmap."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from planners.search.jps import JPS
 
 
 class AutoSettings(SearchSettings):
-    """What the choice of the fastest planner can be told."""
+    """Settings of the fastest planner."""
 
 
 class Auto:
-    """Jump point search where every metre costs the same, A* where some are dearer.
+    """Jump point search if costs are uniform, else A*.
 
-    Both bring a route of the least cost; the route's `planner` names the one that was chosen.
+    Both return a route of the least cost; the route's `planner` names the chosen one.
     """
 
     def __init__(self, costmap: Costmap) -> None:
@@ -27,9 +27,15 @@ class Auto:
     def search(self, start: Pose, goal: Pose, settings: AutoSettings) -> SearchResult | None:
         """Return the route of least cost, or None if there is none.
 
+        Parameters
+        ----------
+        start, goal : tuple of float
+            x and y [m, map]; the rest is ignored.
+        settings : AutoSettings
+
         Raises
         ------
         TimeLimitError
-            Time ran out; with a limit of 0, always.
+            The time limit is exceeded; with a limit of 0, always.
         """
         return self.engine.search(start, goal, SearchSettings(time_limit=settings.time_limit))

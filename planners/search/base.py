@@ -1,4 +1,4 @@
-"""What every planner is: an engine on a costmap, its settings, and what it brings back."""
+"""The interface of planners: an engine on a costmap, its settings, its result and its clock."""
 
 from __future__ import annotations
 
@@ -18,66 +18,71 @@ from planners.problem.problem import PlanningProblem, Pose
 from planners.search.graph import Graph
 from planners.search.kernels.compiling import compiled_for
 
-SLICE = 100_000  # expansions between two looks at the clock: about 20 ms
-
 
 class SearchSettings(Settings):
-    """What every planner can be told."""
+    """Settings that all planners share."""
 
     time_limit: float | None = Field(
         30.0,
         ge=0,
-        description="time from the call to the answer, but for compilation [s]; none: no limit",
+        description="time from the call to the answer, without compilation [s]; none: no limit",
     )
 
-    def heeds_headings(self, problem: PlanningProblem) -> bool:
-        """Whether a planner that knows headings heeds them, told this."""
+    def uses_headings(self, problem: PlanningProblem) -> bool:
+        """Whether a planner that supports headings uses them with these settings."""
         return True
 
     @property
     def takes_other_goals(self) -> bool:
-        """Whether a route may end elsewhere than at the problem's goal."""
+        """Whether a route may end at a place other than the problem's goal."""
         return False
 
-    def will_do(self, end: Pose, goal: Pose, *, axes: int) -> bool:
-        """Whether a route to a goal may end in a pose, on a map of two axes or three."""
+    def accepts_end(self, end: Pose, goal: Pose, *, axes: int) -> bool:
+        """Whether a route to a goal may end at a pose.
+
+        Parameters
+        ----------
+        end, goal : tuple of float [m, map; rad]
+        axes : int
+            Number of axes of the map: 2 or 3.
+        """
         return end == goal
 
 
 class SearchResult(NamedTuple):
-    """What a planner brings back."""
+    """The route that a planner found, and facts about it."""
 
-    waypoints: Floats  #: shape (n, 2) [m, map], start and goal included
-    expanded: int  #: nodes the search expanded
-    headings: Floats | None = None  #: shape (n,) [rad], where the planner decides on them
-    bound: float | None = 1.0  #: the cost is at most this many times the best; None: unbounded
-    cost: float | None = None  #: the length [m], dearer metres counted more; None: the length
-    goal: Pose | None = None  #: where it ends, if that is not the problem's goal
-    graph: Graph | None = None  #: the tree or roadmap it was found in, if that was to be kept
+    waypoints: Floats  #: shape (n, 2) or (n, 3) [m, map], start and goal included
+    expanded: int  #: number of expanded nodes
+    headings: Floats | None = None  #: shape (n,) [rad], if the planner decides on them
+    bound: float | None = 1.0  #: the cost is at most this factor times the least; None: unknown
+    cost: float | None = None  #: length [m], weighted by the costs of cells; None: the length
+    goal: Pose | None = None  #: where the route ends, if not at the problem's goal
+    graph: Graph | None = None  #: the tree or roadmap of the search, if requested
 
 
 class Improvement(NamedTuple):
-    """A route, and what is known of it when it is found, while the search goes on."""
+    """A route that an anytime planner found, while the search continues."""
 
-    cost: float  #: what the planner minimises: the length [m], dearer metres counted more
-    bound: float  #: the cost is at most this many times the least; infinite if nobody knows
-    seconds: float  #: since the search began [s]
-    waypoints: Floats  #: shape (n, 2) [m, map], not audited; none while OMPL doesn't tell
+    cost: float  #: the planner's objective, such as the length [m] weighted by costs of cells
+    bound: float  #: the cost is at most this factor times the least; infinite if unknown
+    seconds: float  #: time since the search began [s]
+    waypoints: Floats  #: shape (n, 2) [m, map], not audited; empty if OMPL does not provide them
 
 
-OnImproved: TypeAlias = Callable[[Improvement], bool | None]  #: True: that will do
+OnImproved: TypeAlias = Callable[[Improvement], bool | None]  #: True ends the search
 
 
 class Cancel(Protocol):
-    """What another thread stops a search with: `threading.Event`, or what looks like one."""
+    """A flag with which another thread stops a search, such as a `threading.Event`."""
 
     def is_set(self) -> bool:
-        """Whether the search is to end."""
+        """Whether the search is to stop."""
         ...
 
 
 def check_cancel(cancel: Any) -> None:
-    """Check that a search can be stopped with what is given for that, if anything is.
+    """Check that an object can cancel a search, unless it is None.
 
     Raises
     ------
@@ -88,12 +93,12 @@ def check_cancel(cancel: Any) -> None:
 
 
 def check_limit(time_limit: Any) -> float | None:
-    """Return a time limit [s] that is given outside of settings, or None for no limit.
+    """Return a time limit [s], or None for no limit.
 
     Raises
     ------
     ProblemError
-        Not a number of 0 or more.
+        The limit is neither None nor a number of 0 or more.
     """
     if time_limit is None:
         return None
@@ -103,7 +108,7 @@ def check_limit(time_limit: Any) -> float | None:
 
 
 class Engine(Protocol):
-    """A planner on one costmap: made once, asked as often as one likes, by a thread at a time."""
+    """A planner on one costmap, for any number of queries, by one thread at a time."""
 
     def __init__(self, costmap: Costmap) -> None: ...
 
@@ -115,47 +120,36 @@ class Engine(Protocol):
     def search(self, start: Pose, goal: Pose, settings: Any) -> SearchResult | None:
         """Return the best route between two places of the costmap, or None if there is none.
 
+        Parameters
+        ----------
+        start, goal : tuple of float [m, map; rad]
+        settings : SearchSettings
+            Settings of the planner.
+
         Raises
         ------
         TimeLimitError
-            Time ran out; with a limit of 0, always.
+            The time limit is exceeded; with a limit of 0, always.
         """
         ...
-
-
-def check_uniform(planner: str, costmap: Costmap) -> None:
-    """Check that every metre of a costmap costs the same.
-
-    Raises
-    ------
-    ProblemError
-        The planner needs that; the sentence names one that doesn't.
-    """
-    if not costmap.uniform:
-        raise ProblemError(
-            "planner",
-            f"uniform costs, which {planner!r} needs",
-            "cells that cost more than others",
-            hint="Take 'astar', which heeds them.",
-        )
 
 
 _began: ContextVar[float | None] = ContextVar("_began", default=None)
 
 
 def now() -> float:
-    """Return a time [s], to compare with others: it stands still while kernels are compiled."""
+    """Return the time [s] of a clock that stops while kernels are compiled."""
     return time.perf_counter() - compiled_for()
 
 
 @contextmanager
 def clock_from(began: float) -> Iterator[None]:
-    """Let the next `Clock` in this thread begin at a time before it is made.
+    """Make the next `Clock` of this thread begin at an earlier time.
 
     Parameters
     ----------
     began : float [s]
-        By `now`.
+        A time that `now` returned.
     """
     token = _began.set(began)
     try:
@@ -165,18 +159,16 @@ def clock_from(began: float) -> Iterator[None]:
 
 
 class Clock:
-    """The time that a search has left.
-
-    It stands still while kernels are compiled.
+    """The clock of one search, which stops while kernels are compiled.
 
     Parameters
     ----------
     planner : str
-        Name for the exception.
+        Name of the planner for exceptions.
     time_limit : float or None [s]
-        From now, or from the time that `clock_from` was given.
+        Counted from the call, or from the time given to `clock_from`.
     cancel : Cancel, optional
-        Once it is set, time is up, too.
+        Once set, time is up as well.
 
     Examples
     --------
@@ -191,7 +183,7 @@ class Clock:
     ) -> None:
         self.planner, self.time_limit, self.cancel = planner, time_limit, cancel
         began = _began.get()
-        _began.set(None)  # a search that this one's callbacks make has a limit of its own
+        _began.set(None)  # a search within this one's callbacks has a limit of its own
         self.began = now() if began is None else began
 
     @property
@@ -201,23 +193,29 @@ class Clock:
 
     @property
     def is_up(self) -> bool:
-        """Whether time has run out, or somebody wants the search to end."""
+        """Whether the time limit is exceeded or the search is cancelled."""
         ran_out = self.time_limit is not None and self.seconds >= self.time_limit
         return ran_out or self.is_cancelled
 
     @property
     def is_cancelled(self) -> bool:
-        """Whether somebody wants the search to end."""
+        """Whether the search is cancelled."""
         return self.cancel is not None and self.cancel.is_set()
 
     def check(self, expanded: int) -> None:
-        """Raise if time has run out.
+        """Raise an error if time is up.
+
+        Parameters
+        ----------
+        expanded : int
+            Number of expanded nodes, for the message.
 
         Raises
         ------
         TimeLimitError
+            The time limit is exceeded.
         CancelledError
-            Somebody wanted the search to end.
+            The search is cancelled.
         """
         if self.is_cancelled:
             raise CancelledError(self.planner, seconds=self.seconds, expanded=expanded)

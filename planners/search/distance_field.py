@@ -1,4 +1,4 @@
-"""From one place to all others: how far they are, and which can be reached."""
+"""Distances from one place to all cells, and the cells that can be reached from it."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from planners.costmap.kernels.moves import ONE
 from planners.costmap.moves import allowed_moves
 from planners.errors import ProblemError
 from planners.problem.problem import PlanningProblem
-from planners.search.base import SLICE, Clock, check_limit
+from planners.search.base import Clock, check_limit
+from planners.search.grid_search import GridSearch, kernel_arrays
 from planners.search.kernels.astar import FAR
-from planners.search.kernels.distance_field import NOBODY, ONE_BITS, SETTLED, seed, settle
+from planners.search.kernels.distance_field import NO_CELL, ONE_BITS, SETTLED, seed, settle
 from planners.search.kernels.flood import flood
 
 
@@ -25,28 +26,29 @@ def distance_field(
     *,
     time_limit: float | None = 30.0,
 ) -> Floats:
-    """Return the cost of the best way from one place to the centre of every cell.
+    """Return the least cost from one place to the centre of every cell.
 
-    Ways are those of A*. With costs that are the same everywhere, costs are lengths.
+    Paths use the moves of A*. Where costs are uniform, the results are lengths.
 
     Parameters
     ----------
     space : PlanningProblem or Costmap
-        The map, on which cells are those of ``Costmap.of(problem).window``.
+        The map; its cells are those of ``Costmap.of(problem).window``.
     source : sequence of float
-        x, y [m, map]; what follows is ignored.
-    time_limit : float, optional [s]
-        None for no limit.
+        x, y [m, map]; the rest is ignored.
+    time_limit : float or None, default 30 [s]
+        None: no limit.
 
     Returns
     -------
     ndarray, shape (rows, cols) [m]
-        Infinite where no way leads: everywhere if the footprint doesn't fit at the source.
+        Infinite at cells that cannot be reached: at all cells if the footprint does not fit at
+        the source.
 
     Raises
     ------
     ProblemError
-        A source that is not finite numbers, a problem without a costmap.
+        The source is not finite, or the problem has no costmap.
     TimeLimitError
 
     Examples
@@ -65,14 +67,14 @@ def distance_field(
     clock = Clock("distance_field", check_limit(time_limit))
     clock.check(0)
     sources = ends_of(costmap, (x, y), (x, y)).sources
-    dearest = max(int(costmap.steps.max()), int(sources[:, 2].max(initial=0)))
+    largest = max(int(costmap.steps.max()), int(sources[:, 2].max(initial=0)))
     labels = np.full(costmap.traversable.size, FAR, dtype=np.int64)
     chain = np.empty((labels.size, 2), dtype=np.int32)
-    heads = np.full((dearest >> ONE_BITS) + 2, NOBODY, dtype=np.int32)
+    heads = np.full((largest >> ONE_BITS) + 2, NO_CELL, dtype=np.int32)
     state = np.zeros(3, dtype=np.int64)
-    graph = costmap.moves.ravel(), costmap.costs.ravel(), costmap.steps, costmap.width
+    arrays = kernel_arrays(costmap)
     seed(costmap.width, sources, labels, chain, heads, state)
-    while not settle(*graph, labels, chain, heads, state, SLICE):
+    while not settle(*arrays, labels, chain, heads, state, GridSearch.slice_size):
         clock.check(int(state[SETTLED]))
     return _metres(labels, costmap)
 
@@ -83,26 +85,26 @@ def reachable(
     *,
     radius: float | None = None,
 ) -> Bools:
-    """Return which cell centres can be reached from a place.
+    """Return which cells' centres can be reached from a place.
 
     Parameters
     ----------
     space : PlanningProblem or Costmap
-        The map, on which cells are those of ``Costmap.of(problem).window``.
+        The map; its cells are those of ``Costmap.of(problem).window``.
     start : sequence of float
-        x, y [m, map]; what follows is ignored.
+        x, y [m, map]; the rest is ignored.
     radius : float, optional [m]
-        Clearance to keep on the way; the footprint's radius unless told.
+        Clearance to keep. Default: the footprint's radius.
 
     Returns
     -------
     ndarray of bool, shape (rows, cols)
-        All False if the footprint doesn't fit at the start.
+        All False if the footprint does not fit at the start.
 
     Raises
     ------
     ProblemError
-        A start that is not finite numbers, a radius that is none, a problem without a costmap.
+        The start is not finite, the radius is negative, or the problem has no costmap.
 
     Examples
     --------

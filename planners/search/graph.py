@@ -1,4 +1,4 @@
-"""Trees and roadmaps as plain arrays."""
+"""Trees and roadmaps as arrays."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ class Graph:
     Attributes
     ----------
     vertices : ndarray, shape (n, 2) or (n, 3) [m, map; rad]
-        x, y and, where the space has it, yaw; on 3-D maps x, y, z.
+        x, y and, if the state space has it, yaw; on 3-D maps x, y, z.
     edges : ndarray of int64, shape (m, 2)
-        Indices of the vertices that an edge joins, from the first to the second; one that can be
-        driven both ways is listed once.
+        Indices of the vertices that each edge joins, from the first to the second. An edge that
+        can be driven in both directions is listed once.
     weights : ndarray, shape (m,) [m]
-        Lengths of the edges: of straight lines, or of the curves between two poses.
+        Lengths of the edges, which are straight lines or curves between two poses.
     """
 
     vertices: Floats

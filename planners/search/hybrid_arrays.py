@@ -1,4 +1,4 @@
-"""Hybrid A*'s own arrays, as its kernels read them."""
+"""The arrays that hybrid A*'s kernels take."""
 
 from __future__ import annotations
 
@@ -17,14 +17,19 @@ from planners.search.kernels.hybrid_field import BUCKETS, Field
 
 
 def field_of(costmap: Costmap, footprint: Footprint) -> Field:
-    """Return the field of the ways for base_link: it keeps the inscribed radius.
+    """Return an empty distance field for base_link, which keeps the inscribed radius as clearance.
 
-    It need not do so at a cell's centre: a cell counts as narrow if it may elsewhere.
+    A cell is narrow if its centre does not have that clearance while another point of it may.
+
+    Parameters
+    ----------
+    costmap : Costmap
+    footprint : Footprint
     """
     cells, inscribed = costmap.blocked.size, footprint.inscribed_radius
     corner = math.sqrt(0.5) * costmap.window.resolution  # from a cell's centre
     places = (costmap.clearance + corner >= inscribed) & ~costmap.blocked
-    if not footprint.is_disc and inscribed == 0.0:  # base_link may be over what is blocked
+    if not footprint.is_disc and inscribed == 0.0:  # base_link may be over blocked cells
         places = np.ones_like(costmap.blocked)
     return Field(
         moves=allowed_moves(places).ravel(),
@@ -37,19 +42,19 @@ def field_of(costmap: Costmap, footprint: Footprint) -> Field:
 
 
 def factors_of(costmap: Costmap) -> Floats:
-    """Return what a length costs by the cost of its cell, as a multiple of itself."""
+    """Return the factor that multiplies a length, by the cost of its cell; shape (256,) or (1,)."""
     if costmap.uniform:
         return np.ones(1)
     return 1.0 + costmap.top * np.minimum(np.arange(256), MAX_NON_OBSTACLE) / MAX_NON_OBSTACLE
 
 
 def no_shot() -> Shot:
-    """Return the curve of no length."""
+    """Return a curve of length 0."""
     return Shot(np.zeros(SEGMENTS), np.zeros(SEGMENTS, dtype=np.int64))
 
 
 def empty_nodes(room: int) -> Nodes:
-    """Return room for nodes: a power of two, as the table's size must be one."""
+    """Return uninitialised nodes; `room` must be a power of two, as the table's size is one."""
     return Nodes(
         poses=np.empty((room, 3)),
         costs=np.empty(room),

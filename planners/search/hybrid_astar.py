@@ -1,4 +1,4 @@
-"""Hybrid A*: routes that a robot can steer, for a footprint that turns with it."""
+"""Hybrid A*: routes of bounded curvature, for a footprint that turns with the robot."""
 
 from __future__ import annotations
 
@@ -17,84 +17,88 @@ from planners.geometry.kernels.curves import wrap
 from planners.geometry.kernels.swept_footprint import step_clear
 from planners.problem.problem import Pose
 from planners.search.base import Clock, SearchResult, SearchSettings
+from planners.search.grid_search import enlarge
 from planners.search.hybrid_arrays import empty_nodes, factors_of, field_of, no_shot
+from planners.search.kernels.astar import EXHAUSTED, EXPANDED, FOUND, HEAP_FULL, TARGET
 from planners.search.kernels.hybrid_astar import (
     COUNT,
-    EXHAUSTED,
-    EXPANDED,
-    FOUND,
-    FULL,
-    LAST,
     STATE_SIZE,
     Nodes,
     Shot,
     advance,
     begin,
     drive_along,
-    refile,
+    rebuild_table,
 )
 from planners.search.kernels.hybrid_field import seed_field
 from planners.search.kernels.hybrid_motion import ROOT, Drive, Prices, pieces, reach, steering
 
-SLICE = 1000  # expansions between two looks at the clock, at most
-SOON = 0.02  # [s] between two looks, about: an expansion takes microseconds, or milliseconds
-FIRST_ROOM = 1 << 12  # nodes to begin with
+SOON = 0.02  # [s] between two checks of the clock, about: expansions take 1 us to some ms
 
 
 class HybridAStarSettings(SearchSettings):
-    """What hybrid A* can be told."""
+    """Settings of hybrid A*."""
 
     turning_radius: float = Field(
-        1.0, ge=0.01, le=1000, description="tightest turn of base_link [m]"
+        1.0, ge=0.01, le=1000, description="least turning radius of base_link [m]"
     )
     motion: Literal["dubins", "reeds_shepp"] = Field(
-        "reeds_shepp", description="forward only (dubins), or backwards too (reeds_shepp)"
+        "reeds_shepp", description="forward only (dubins), or forward and backward (reeds_shepp)"
     )
     reverse_penalty: float = Field(
-        2.0, ge=1, le=100, description="a metre driven backwards counts as that many"
+        2.0, ge=1, le=100, description="factor on lengths that are driven backward"
     )
     gear_change_penalty: float = Field(
         0.5,
         ge=0,
         le=1000,
-        description="a change between forward and backwards counts as that much [m]",
+        description="cost of a change between forward and backward [m]",
     )
     steering_penalty: float = Field(
         0.1,
         ge=0,
         le=1000,
-        description="turning the steering from stop to stop counts as that much [m]",
+        description="cost of turning the steering from stop to stop [m]",
     )
-    heading_bins: int = Field(72, ge=8, le=720, description="headings told apart [bins per turn]")
+    heading_bins: int = Field(
+        72, ge=8, le=720, description="resolution of headings [bins per turn]"
+    )
     step_length: float | None = Field(
         None,
         gt=0,
         le=100,
-        description="length of a motion [m]; none, and the least: the diagonal of a cell",
+        description="length of a motion [m]; none: the diagonal of a cell, which is the least",
     )
     analytic_ratio: float = Field(
-        3.5, gt=0, le=1000, description="the higher, the more often the curve to the goal is tried"
+        3.5,
+        gt=0,
+        le=1000,
+        description="how often the curve to the goal is tried: the higher, the more often",
     )
     weight: float = Field(
         1.5,
         ge=1,
         le=10,
-        description="how much more than itself the estimate of what is left counts",
+        description="factor on the estimate of the remaining cost",
     )
 
 
 class HybridAStar:
     """Hybrid A* over motions of constant curvature (Dolgov, Thrun, Montemerlo, Diebel 2010).
 
-    Waypoints are poses, at most half a cell apart; the first and the last are start and goal
-    exactly. The robot drives along its heading, forward or backwards, and turns no tighter than
-    told. No route is the best one for sure: one pose stands for all in its cell and bin.
+    Waypoints are poses, at most half a cell apart; the first and the last are exactly start and
+    goal. The robot drives along its heading, forward or backward, and keeps the turning radius.
+    Routes are not guaranteed to be optimal, as one pose represents all in its cell and heading bin.
 
-    Between two poses the footprint is taken to sweep the convex hull of its places in both (of a
-    concave one: of each triangle of its constrained Delaunay triangulation), and where it turns,
-    about a millimetre around that (on cells of more than a metre, a thousandth of a cell: `BULGE`
-    in `planners.costmap.swept_footprint`), which no point of it ever leaves. A disc is checked by
-    the distance of the line. Where nothing turns, both are exact.
+    Between two poses, the swept area is approximated by the convex hull of both placements of the
+    footprint (of each triangle of its constrained Delaunay triangulation, if it is concave). If
+    the robot turns, the hull is grown by about a millimetre (by a thousandth of a cell on cells of
+    more than a metre: `BULGE` in `planners.costmap.swept_footprint`), which covers all points of
+    the footprint. A disc is checked by its centre line's distance. Without a turn, both are exact.
+
+    Parameters
+    ----------
+    costmap : Costmap
 
     Examples
     --------
@@ -105,12 +109,14 @@ class HybridAStar:
     >>> car = [(-0.5, -0.4), (1.5, -0.4), (1.5, 0.4), (-0.5, 0.4)]
     >>> problem = PlanningProblem(grid, start=(5, 5, 0), goal=(9, 9, np.pi / 2), footprint=car)
     >>> engine = HybridAStar(Costmap.of(problem))
-    >>> found = engine.search(problem.start, problem.goal, HybridAStarSettings(turning_radius=4))
-    >>> found.waypoints[[0, -1]].tolist(), found.headings[[0, -1]].tolist(), found.expanded
+    >>> result = engine.search(problem.start, problem.goal, HybridAStarSettings(turning_radius=4))
+    >>> result.waypoints[[0, -1]].tolist(), result.headings[[0, -1]].tolist(), result.expanded
     ([[5.0, 5.0], [9.0, 9.0]], [0.0, 1.5707963267948966], 1)
     """
 
     name: ClassVar[str] = "hybrid_astar"
+    slice_size: ClassVar[int] = 1000  #: expansions between two checks of the clock, at most
+    first_room: ClassVar[int] = 1 << 12  #: nodes to begin with
 
     def __init__(self, costmap: Costmap) -> None:
         self.costmap = costmap
@@ -120,23 +126,29 @@ class HybridAStar:
         self.shape = shape_of(footprint, size, slack=costmap.slack)
         self.field = field_of(costmap, footprint)
         self.prices = Prices(costmap.costs, factors_of(costmap))
-        self.nodes = empty_nodes(FIRST_ROOM)
-        self.heap = np.empty((2 * FIRST_ROOM, 2), dtype=np.int64)
-        # Nothing waits: this only compiles, which may take long, where no clock is running yet.
+        self.nodes = empty_nodes(self.first_room)
+        self.heap = np.empty((2 * self.first_room, 2), dtype=np.int64)
+        # The heap is empty, so this only compiles the kernels, before any clock runs.
         drive, shot = _drive(HybridAStarSettings(), size), no_shot()
-        self._advance(drive, np.zeros(3), np.zeros(STATE_SIZE, dtype=np.int64), shot)
+        self._advance(drive, np.zeros(3), np.zeros(STATE_SIZE, dtype=np.int64), shot, 1)
 
     def search(self, start: Pose, goal: Pose, settings: HybridAStarSettings) -> SearchResult | None:
         """Return a route from start to goal, or None if there is none.
 
-        None is also what a start or a goal gets where the footprint overlaps blocked cells.
+        There is none if the footprint overlaps blocked cells at the start or at the goal.
+
+        Parameters
+        ----------
+        start, goal : tuple of float [m, map; rad]
+            x, y and yaw.
+        settings : HybridAStarSettings
 
         Raises
         ------
         ProblemError
-            A start or a goal without a yaw.
+            The start or the goal has no yaw.
         TimeLimitError
-            Time ran out; with a limit of 0, always.
+            The time limit is exceeded; with a limit of 0, always.
         """
         clock = Clock(self.name, settings.time_limit)
         clock.check(0)
@@ -152,16 +164,16 @@ class HybridAStar:
             clock.check(int(state[EXPANDED]))
             before = clock.seconds
             status = self._advance(drive, b, state, shot, budget)
-            hurried = clock.seconds - before > SOON
-            budget = max(budget // 4, 1) if hurried else min(2 * budget, SLICE)
+            slow = clock.seconds - before > SOON
+            budget = max(budget // 4, 1) if slow else min(2 * budget, self.slice_size)
         if status == EXHAUSTED:
             return None
-        curvatures, lengths = self._motions(drive, int(state[LAST]), shot)
+        curvatures, lengths = self._motions(drive, int(state[TARGET]), shot)
         poses = drive_along(self.shape, a, curvatures, lengths)
         return self._to_result(poses, start, goal, int(state[EXPANDED]))
 
     def _in_cells(self, place: Place, pose: Pose) -> Floats:
-        """Return a pose in cells, with its yaw."""
+        """Return a pose, shape (3,) [cells; rad]."""
         if len(pose) != 3:
             raise ProblemError(place, f"x, y [m] and yaw [rad] for {self.name}", str(pose))
         x, y = self.costmap.to_cells(pose[:2])[0]
@@ -173,9 +185,7 @@ class HybridAStar:
         x, y, yaw = pose.tolist()
         return within and bool(step_clear(self.ground, self.shape, x, y, yaw, x, y, yaw, 0.0))
 
-    def _advance(
-        self, drive: Drive, goal: Floats, state: Ints, shot: Shot, budget: int = SLICE
-    ) -> int:
+    def _advance(self, drive: Drive, goal: Floats, state: Ints, shot: Shot, budget: int) -> int:
         status: int = advance(
             self.ground,
             self.shape,
@@ -189,17 +199,17 @@ class HybridAStar:
             shot,
             budget,
         )
-        if status == FULL:
-            self.heap = np.concatenate([self.heap, np.empty_like(self.heap)])
+        if status == HEAP_FULL:
+            self.heap = enlarge(self.heap, by=len(self.heap))
             smaller, count = self.nodes, int(state[COUNT])
             self.nodes = empty_nodes(2 * len(smaller.costs))
             for name in Nodes._fields[:-1]:
                 getattr(self.nodes, name)[:count] = getattr(smaller, name)[:count]
-            refile(self.nodes, count)
+            rebuild_table(self.nodes, count)
         return status
 
     def _motions(self, drive: Drive, node: int, shot: Shot) -> tuple[Floats, Floats]:
-        """Return curvatures and lengths from the start through a node and along the last curve."""
+        """Return curvatures and lengths of the motions to a node and of the curve after it."""
         motions = []
         while self.nodes.motions[node] != ROOT:
             gear, turn = steering(self.nodes.motions[node])
@@ -215,7 +225,7 @@ class HybridAStar:
         return curvatures.copy(), lengths.copy()
 
     def _to_result(self, poses: Floats, start: Pose, goal: Pose, expanded: int) -> SearchResult:
-        """Return poses [cells] as a route on the map, with start and goal as they were given."""
+        """Return poses [cells] as a route on the map that begins and ends exactly as requested."""
         if len(poses) == 1:
             poses = np.concatenate([poses, poses])
         window = self.costmap.window
@@ -227,7 +237,7 @@ class HybridAStar:
         return SearchResult(waypoints, expanded, headings, bound=None, cost=cost)
 
     def _cost(self, poses: Floats) -> float:
-        """Return the length of a line [m], with what its cells add to it; no penalties."""
+        """Return the length of a line weighted by the costs of its cells, without penalties [m]."""
         steps = np.diff(poses[:, :2], axis=0)
         middle = poses[:-1, :2] + 0.5 * steps
         costs = self.costmap.costs[tuple(np.floor(middle[:, ::-1]).astype(np.int64).T)]
@@ -236,7 +246,7 @@ class HybridAStar:
 
 
 def _drive(settings: HybridAStarSettings, size: float) -> Drive:
-    """Return the settings in cells of a side of `size` [m]."""
+    """Return the settings in units of cells of side `size` [m]."""
     step = math.sqrt(2.0)
     if settings.step_length is not None:
         step = max(settings.step_length / size, step)

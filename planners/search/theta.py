@@ -1,50 +1,33 @@
-"""Theta* and Lazy Theta*: A* whose lines take shortcuts at any angle while it searches."""
+"""Theta* and Lazy Theta*: A* whose lines take shortcuts at any angle during the search."""
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from groundmap.arrays import Floats, Ints
 from planners.costmap.costmap import Costmap
-from planners.costmap.endpoints import ends_of, waypoints_through
 from planners.costmap.kernels.moves import ONE
-from planners.problem.problem import Pose
-from planners.search.base import SLICE, Clock, SearchResult, SearchSettings, check_uniform
-from planners.search.kernels.astar import (
-    EXHAUSTED,
-    EXPANDED,
-    FAR,
-    FOUND,
-    HEAP_FULL,
-    SIZE,
-    SLICE_DONE,
-    TARGET,
-)
+from planners.search.base import SearchSettings
+from planners.search.grid_search import CostmapSearch, GridQuery
+from planners.search.kernels.astar import FAR, TARGET
 from planners.search.kernels.theta import advance, parents, seed
-
-FIRST_ROOM = 1 << 14  # heap entries to begin with
 
 
 class ThetaSettings(SearchSettings):
-    """What Theta* can be told."""
+    """Settings of Theta*."""
 
 
 class LazyThetaSettings(SearchSettings):
-    """What Lazy Theta* can be told."""
+    """Settings of Lazy Theta*."""
 
 
-class Theta:
+class Theta(CostmapSearch):
     """Theta* (Nash, Daniel, Koenig, Felner 2007): short lines, though not always the shortest.
 
-    Lines turn at cell centres and keep to the squares between the centres of four cells that can
-    be stood on, and the straight pieces between two. Every metre has to cost the same.
-
-    Raises
-    ------
-    ProblemError
-        The costmap makes some metres dearer than others.
+    Lines turn at cell centres. They stay in the squares between the centres of four traversable
+    cells, and on the straight pieces between two. Costs must be uniform.
 
     Examples
     --------
@@ -58,77 +41,51 @@ class Theta:
     [[5.5, 5.5], [29.5, 12.5]]
     """
 
-    name: ClassVar[str] = "theta"
+    name = "theta"
+    needs_uniform = True
     lazy: ClassVar[bool] = False
 
     def __init__(self, costmap: Costmap) -> None:
-        check_uniform(self.name, costmap)
-        self.costmap = costmap
+        super().__init__(costmap)
         self.costs = np.zeros(costmap.traversable.size)
         self.marks = np.zeros((costmap.traversable.size, 2), dtype=np.int64)
-        self.query = 0
-        self.heap = np.empty((FIRST_ROOM, 2), dtype=np.int64)
+        self.queries = 0
 
-    def search(self, start: Pose, goal: Pose, settings: SearchSettings) -> SearchResult | None:
-        """Return a short route from start to goal, or None if there is none.
+    def _bound(self, settings: Any) -> None:
+        return None
 
-        Parameters
-        ----------
-        start, goal : tuple of float
-            x and y [m, map]; what follows is ignored.
-        settings : ThetaSettings or LazyThetaSettings
+    def _seed(self, query: GridQuery) -> None:
+        self.queries += 1
+        size = seed(
+            _in_cells(query.ends.sources),
+            _in_cells(query.ends.targets),
+            self.costmap.width,
+            self.costs,
+            self.marks,
+            self.queries,
+            self.heap,
+        )
+        self.state = np.array([size, FAR, -1, 0], dtype=np.int64)
 
-        Raises
-        ------
-        TimeLimitError
-            Time ran out; with a limit of 0, always.
-        """
-        clock = Clock(self.name, settings.time_limit)
-        clock.check(0)
-        ends = ends_of(self.costmap, start, goal)
-        if ends.direct:
-            return SearchResult(
-                waypoints_through(self.costmap, start, goal, np.empty((0, 2), int)), 0
-            )
-        targets = _in_cells(ends.targets)
-        state = self._seed(_in_cells(ends.sources), targets)
-        status = SLICE_DONE
-        while status not in (FOUND, EXHAUSTED):
-            clock.check(int(state[EXPANDED]))
-            status = self._advance(targets, state)
-        if status == EXHAUSTED:
-            return None
-        turns = parents(self.marks, int(state[TARGET]))[::-1]
-        cells = np.column_stack(np.divmod(turns, self.costmap.width))
-        waypoints = waypoints_through(self.costmap, start, goal, cells)
-        return SearchResult(waypoints, int(state[EXPANDED]), bound=None)
-
-    def _seed(self, sources: Floats, targets: Floats) -> Ints:
-        self.query += 1
-        state = np.array([0, FAR, -1, 0], dtype=np.int64)
-        width = self.costmap.width
-        state[SIZE] = seed(sources, targets, width, self.costs, self.marks, self.query, self.heap)
-        return state
-
-    def _advance(self, targets: Floats, state: Ints) -> int:
-        status = advance(
+    def _advance(self, query: GridQuery) -> int:
+        return advance(
             self.costmap.moves,
-            targets,
+            _in_cells(query.ends.targets),
             self.lazy,
             self.costs,
             self.marks,
-            self.query,
+            self.queries,
             self.heap,
-            state,
-            SLICE,
+            self.state,
+            self.slice_size,
         )
-        if status == HEAP_FULL:
-            self.heap = np.concatenate([self.heap, np.empty_like(self.heap)])
-        return status
+
+    def _trace(self) -> Ints:
+        return self._cells(parents(self.marks, int(self.state[TARGET]))[::-1])
 
 
 class LazyTheta(Theta):
-    """Lazy Theta* (Nash, Koenig, Tovey 2010): looks for a line of sight once per expanded cell."""
+    """Lazy Theta* (Nash, Koenig, Tovey 2010): checks the line of sight once per expanded cell."""
 
     name = "lazy_theta"
     lazy = True

@@ -1,4 +1,4 @@
-"""The widest way between two places: the one whose smallest clearance is the greatest."""
+"""The widest path between two places: the one whose least clearance is largest."""
 
 from __future__ import annotations
 
@@ -16,44 +16,45 @@ from planners.costmap.kernels.moves import DIAGONAL, ONE
 from planners.error_messages import Place, Point
 from planners.geometry.kernels.clearance import segment_clearance
 from planners.geometry.polyline import merge_collinear
+from planners.search.grid_search import GridSearch, enlarge
 from planners.search.kernels import astar
-from planners.search.kernels.heap import push
 from planners.search.kernels.lattice import squared_clearance
 from planners.search.kernels.widest_path import UNIT, WIDER, spread, steps_over
 
-# What steps cost of which no, one, or both ends are at the narrowest: both count twice.
+# Costs of steps of which no, one or both ends have the least clearance: such an end's half counts
+# twice.
 STEPS = np.rint(np.array([[ONE], [DIAGONAL]]) * [1.0, 1.5, 2.0]).astype(np.int64)
-# [cells] Every place has a lattice point within a quarter of a cell along x and along y, and a line
-# leads past such points: no way is wider by more than twice that distance.
+# [cells] Every point has a lattice point within a quarter of a cell along x and along y, so a path
+# off the lattice is wider by at most twice that distance.
 LATTICE_SLACK = math.sqrt(0.5)
-FIRST_ROOM = 1 << 14  # heap entries to begin with
 
 
 class WidestRoute(NamedTuple):
-    """The widest way between two places, along the half-cell lattice.
+    """The widest path between two places on the half-cell lattice.
 
-    A slanted way off the lattice may be wider, by up to 0.71 cells.
+    A slanted path off the lattice may be wider, by at most 0.71 cells.
     """
 
     waypoints: Floats  #: shape (n, 2) [m, map]: start, turning points, goal
-    width: float  #: of the widest disc that can follow it [m]; infinite if nothing is blocked
-    bottleneck: Point  #: where it is narrowest [m, map]
-    clearance: float  #: half the width: its smallest distance to what is blocked [m]
+    width: float  #: diameter of the widest disc that can follow it [m]; infinite: no obstacles
+    bottleneck: Point  #: its narrowest point [m, map]
+    clearance: float  #: its least distance to blocked cells [m], half the width
 
 
-def widest_way(costmap: Costmap, *, seen_from: Place = "start") -> WidestRoute | None:
-    """Return the widest way from start to goal, or None if there is none, however narrow.
+def widest_path(costmap: Costmap, *, seen_from: Place = "start") -> WidestRoute | None:
+    """Return the widest path from start to goal, or None if there is no path of any width.
 
-    Ways lead over the half-cell lattice, along its lines and between centres and corners of
-    cells; no way on it is wider. Of those as wide it is the shortest, where what is as narrow as
-    its narrowest place counts twice.
+    Paths lie on the half-cell lattice: on its lines, and between centres and corners of cells.
+    Among equally wide paths, the shortest is returned, where pieces of the least clearance count
+    twice.
 
     Parameters
     ----------
     costmap : Costmap
     seen_from : {"start", "goal"}
-        The bottleneck is where the way leaves for good what can be reached from here in a wider
-        way. (What is beside it may be as narrow, and another bottleneck may come after.)
+        The bottleneck is the point after which the path no longer touches the region that a wider
+        path reaches from this end. (Points beside it may be as narrow, and further bottlenecks may
+        follow.)
     """
     ends = [costmap.problem.start_xy, costmap.problem.goal_xy]
     if seen_from == "goal":
@@ -83,11 +84,11 @@ def widest_way(costmap: Costmap, *, seen_from: Place = "start") -> WidestRoute |
 
 
 def _pieces(costmap: Costmap, squared: Ints32, place: Point) -> Ints:
-    """Return the lattice points that straight pieces join a place [cells] to, shape (n, 4).
+    """Return the lattice points that straight pieces join to a place [cells], shape (n, 4).
 
-    Row, column, the least squared clearance on the piece and at the point times `UNIT`, and the
-    piece's length in half cells times `ONE`; the clearest first. The points are those around the
-    place, and the centres that it is joined to in a search.
+    Columns are row, column, least squared clearance of piece and point times `UNIT`, and length of
+    the piece [half cells] times `ONE`. Rows are sorted by decreasing clearance. The points are
+    those around the place, and the centres that a search joins it to.
     """
     x, y = place
     around = {
@@ -112,7 +113,7 @@ def _pieces(costmap: Costmap, squared: Ints32, place: Point) -> Ints:
 
 
 def _spread(squared: Ints32, sources: Ints, targets: Ints) -> tuple[int, Bytes]:
-    """Return how clear the widest way from a source to a target is, and where wider ones lead."""
+    """Return the clearance of the widest path, and the points that wider paths reach."""
     width = squared.shape[1]
     if len(sources) == 0 or len(targets) == 0:
         return 0, np.zeros(squared.shape, dtype=np.uint8)
@@ -120,7 +121,7 @@ def _spread(squared: Ints32, sources: Ints, targets: Ints) -> tuple[int, Bytes]:
         np.column_stack([pieces[:, 0] * width + pieces[:, 1], pieces[:, 2]])
         for pieces in (sources, targets)
     )
-    # What is clearer than all of the targets need not be told apart.
+    # Clearances above those of all targets need not be distinguished.
     begin[:, 1] = np.minimum(begin[:, 1], end[:, 1].max() + 1)
     answer, parts = spread(squared.ravel(), width, begin, end)
     return answer, parts.reshape(squared.shape)
@@ -129,7 +130,7 @@ def _spread(squared: Ints32, sources: Ints, targets: Ints) -> tuple[int, Bytes]:
 def _key(costmap: Costmap, a: Point, b: Point) -> int:
     """Return the squared clearance of the straight piece a-b [cells] times `UNIT`.
 
-    0 if it touches what is blocked, or spans more than two by two cells.
+    0 if it touches a blocked cell or spans more than 2 x 2 cells.
     """
     if not is_clear(costmap, a, b, radius=0.0):
         return 0
@@ -138,41 +139,38 @@ def _key(costmap: Costmap, a: Point, b: Point) -> int:
 
 
 def _shortest(squared: Ints32, key: int, sources: Ints, targets: Ints) -> Ints:
-    """Return the lattice points of the shortest way that is as clear as that, shape (n, 2).
+    """Return the lattice points of the shortest path of a given clearance, shape (n, 2).
 
     Parameters
     ----------
     squared : ndarray of int32, shape (rows, cols)
     key : int
-        Squared clearance times `UNIT`; such a way exists.
+        Squared clearance times `UNIT`; such a path exists.
     sources, targets : ndarray of int64, shape (n, 4)
-        As `_pieces` returns them.
+        As returned by `_pieces`.
     """
     width = squared.shape[1]
     moves = steps_over(squared.ravel(), width, -(-key // UNIT))
     costs = (squared == key / UNIT).astype(np.uint8).ravel()
     begin, end = (pieces[pieces[:, 2] >= key][:, [0, 1, 3]] for pieces in (sources, targets))
     labels = np.zeros((squared.size, 2), dtype=np.int64)
-    heap = np.empty((FIRST_ROOM, 2), dtype=np.int64)
-    state = np.array([0, astar.FAR, -1, 0], dtype=np.int64)
-    for row, col, cost in begin.tolist():
-        labels[row * width + col] = cost, astar.MARK + astar.ROOT
-        h = astar.estimate(row, col, end)
-        state[astar.SIZE] = push(heap, state[astar.SIZE], cost + h, h, row * width + col)
+    heap = np.empty((GridSearch.first_room, 2), dtype=np.int64)
+    size = astar.seed(begin, end, astar.UNIT, width, astar.MARK + astar.ROOT, labels, heap)
+    state = np.array([size, astar.FAR, -1, 0], dtype=np.int64)
     status = astar.HEAP_FULL
     while status == astar.HEAP_FULL:
         status = astar.advance(
             moves, costs, STEPS, width, end, astar.UNIT, labels, 1, heap, state, squared.size + 1
         )
         if status == astar.HEAP_FULL:
-            heap = np.concatenate([heap, np.empty_like(heap)])
+            heap = enlarge(heap, by=len(heap))
     assert status == astar.FOUND
     turns = astar.trace(labels, width, int(state[astar.TARGET]))[::-1]
     return _fill_line(np.column_stack(np.divmod(turns, width)))
 
 
 def _fill_line(turns: Ints) -> Ints:
-    """Return all lattice points of a line, given those where it begins, turns and ends."""
+    """Return all lattice points of a line, given its first, turning and last points."""
     pieces = [turns[:1]]
     for a, b in pairwise(turns):
         steps = np.abs(b - a).max()
@@ -181,14 +179,14 @@ def _fill_line(turns: Ints) -> Ints:
 
 
 def _bottleneck(keys: Ints, wider: Bools) -> int:
-    """Return which point of a way is the middle of where it gets narrow.
+    """Return the index of the point in the middle of a path's bottleneck.
 
     Parameters
     ----------
     keys : ndarray of int64, shape (n,)
-        Clearance of the points, to be compared.
+        Clearances of the points.
     wider : ndarray of bool, shape (n,)
-        Points that can be reached in a wider way; not the last one.
+        Whether a wider path reaches the point; False for the last one.
     """
     first = int(np.flatnonzero(np.append(True, wider))[-1])
     other = np.flatnonzero(keys[first:] != keys[first])

@@ -76,7 +76,7 @@ def test_a_route_ends_at_an_accepted_goal(options: dict[str, Any]) -> None:
     problem = asked(footprint=CAR)
     route = plan(problem, "rrtconnect", space="se2", goal_yaw_tolerance=0.3, **options)
     end = (*route.waypoints[-1].tolist(), float(route.headings[-1]))
-    assert SamplingSettings(goal_yaw_tolerance=0.3, **options).will_do(end, (14, 2, 0), axes=2)
+    assert SamplingSettings(goal_yaw_tolerance=0.3, **options).accepts_end(end, (14, 2, 0), axes=2)
 
 
 def test_a_route_that_ends_at_no_goal_is_caught() -> None:

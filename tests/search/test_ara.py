@@ -1,4 +1,4 @@
-"""ARA*: its bounds hold whenever it stops, and given time it is A*."""
+"""ARA*: its bounds hold whenever it stops, and with enough time the route is optimal."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ from planners.search.kernels.ara import WAITS
 from planners.search.kernels.astar import BEST, CAME, EXPANDED, FAR, MARK, ROOT
 
 PLAIN = CostSettings()
-DEAR = CostSettings(clearance_weight=4.0, inflation_radius=4.0, confidence_weight=10.0)
+COSTLY = CostSettings(clearance_weight=4.0, inflation_radius=4.0, confidence_weight=10.0)
 SIDE = 40
 queries = st.tuples(
-    st.integers(0, 10_000), st.sampled_from([PLAIN, DEAR]), st.sampled_from([0.0, 0.5])
+    st.integers(0, 10_000), st.sampled_from([PLAIN, COSTLY]), st.sampled_from([0.0, 0.5])
 )
-# Looks at the clock until time is up, and expansions in between: within iterations, between them.
+# Checks of the clock until time is up, and expansions between two of them.
 cuts = st.tuples(st.integers(1, 60), st.integers(1, 40)) | st.tuples(
     st.integers(2, 6), st.just(10**6)
 )
 
 
 def costmap_of(seed: int, costs: CostSettings = PLAIN, footprint: float = 0.0) -> Costmap:
-    """Return a field of obstacles and walls with doors; of half its cells little is known."""
+    """Return a field of obstacles and walls with doors; half of its cells have low confidence."""
     rng = np.random.default_rng(seed)
     z = rng.choice([-1.0, -0.02], (SIDE, SIDE))
     z[rng.random((SIDE, SIDE)) < rng.choice([0.05, 0.15, 0.3])] = BLOCKED
@@ -85,7 +85,7 @@ def least_cost(costmap: Costmap) -> float:
         lengths += [length, length]
     tails, heads = np.concatenate(edges).T
     size = (traversable.size + 2, traversable.size + 2)
-    # SciPy takes an edge of length 0 for none: a link onto the start's own cell.
+    # SciPy ignores edges of length 0, such as the piece from a start at its cell's centre.
     weights = np.maximum(np.concatenate(lengths).astype(np.float64), 1e-3)
     graph = coo_array((weights, (tails, heads)), shape=size)
     total = float(dijkstra(graph.tocsr(), indices=begin)[end])
@@ -98,7 +98,7 @@ def _indices(index: Ints, links: Ints) -> Ints:
 
 
 def cost_along(costmap: Costmap, waypoints: Floats) -> float:
-    """Return what a line through cell centres costs, step by step [m]."""
+    """Return the cost of a line through cell centres, step by step [m]."""
     first, last = (
         {(row, col): cost for row, col, cost in joined.tolist()}
         for joined in ends_of(costmap, *ends(costmap))[:2]
@@ -119,7 +119,7 @@ def searched(
     *,
     on_improved: Callable[[Improvement], bool | None] | None = None,
 ) -> tuple[SearchResult | None, list[Improvement]]:
-    """Return the route between the problem's ends, and what was reported on the way."""
+    """Return the route between the problem's ends, and all reports."""
     reports: list[Improvement] = []
 
     def report(better: Improvement) -> bool | None:
@@ -136,7 +136,7 @@ def ends(costmap: Costmap) -> tuple[Pose, Pose]:
 
 
 def check(costmap: Costmap, found: SearchResult | None, reports: list[Improvement]) -> None:
-    """Check that every report keeps its promise, betters the one before, and is a real route."""
+    """Check that every report keeps its bound, improves the previous one, and is a valid route."""
     least = least_cost(costmap)
     if found is None:
         assert least == np.inf
@@ -179,7 +179,7 @@ def test_every_bound_holds_and_the_last_route_is_the_best(
 
 @given(queries, st.integers(1, 4))
 @settings(max_examples=15)
-def test_a_callback_that_has_enough_ends_the_search(
+def test_a_callback_that_returns_true_ends_the_search(
     query: tuple[int, CostSettings, float], enough: int
 ) -> None:
     costmap = costmap_of(*query)
@@ -194,13 +194,13 @@ def test_a_callback_that_has_enough_ends_the_search(
 
 @given(queries, cuts)
 @settings(max_examples=80)
-def test_cut_short_anywhere_the_bound_holds(
+def test_the_bound_holds_after_a_stop_at_any_time(
     query: tuple[int, CostSettings, float], cut: tuple[int, int]
 ) -> None:
-    costmap, (looks, budget) = costmap_of(*query), cut
+    costmap, (checks, budget) = costmap_of(*query), cut
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("planners.search.ara.SLICE", budget)
-        patch.setattr("planners.search.ara.Clock", clock_of(looks))
+        patch.setattr(ARA, "slice_size", budget)
+        patch.setattr("planners.search.ara.Clock", clock_of(checks))
         engine = ARA(costmap)
         try:
             found, reports = searched(engine, ARASettings(time_limit=1.0))
@@ -208,14 +208,14 @@ def test_cut_short_anywhere_the_bound_holds(
             assert engine.state[BEST] == FAR
         else:
             check(costmap, found, reports)
-        assert engine.state[EXPANDED] <= looks * budget
+        assert engine.state[EXPANDED] <= checks * budget
 
 
-def clock_of(looks: int) -> type[Clock]:
-    """Return a clock that is up after so many looks at it."""
+def clock_of(checks: int) -> type[Clock]:
+    """Return a clock that is up after a number of checks."""
 
     class Countdown(Clock):
-        left = looks
+        left = checks
 
         @property
         def is_up(self) -> bool:
@@ -227,7 +227,7 @@ def clock_of(looks: int) -> type[Clock]:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_no_iteration_expands_a_cell_twice(seed: int) -> None:
-    engine, before = ARA(costmap_of(seed, DEAR)), [0]
+    engine, before = ARA(costmap_of(seed, COSTLY)), [0]
 
     def report(better: Improvement) -> None:
         expanded = int(engine.state[EXPANDED])
@@ -240,7 +240,7 @@ def test_no_iteration_expands_a_cell_twice(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_no_route_through_a_cell_that_waits_costs_less_than_the_least_total(seed: int) -> None:
-    engine = ARA(costmap_of(seed, DEAR))
+    engine = ARA(costmap_of(seed, COSTLY))
     joined = ends_of(engine.costmap, *ends(engine.costmap))
     rows, cols = np.indices(engine.costmap.traversable.shape).reshape(2, -1)
 
@@ -253,13 +253,13 @@ def test_no_route_through_a_cell_that_waits_costs_less_than_the_least_total(seed
         octile = (away[1] - away[0]) * ONE + away[0] * DIAGONAL + joined.targets[:, 2:]
         totals = engine.labels[:, 0] + octile.min(axis=0)
         least = min(int(totals[waits].min(initial=FAR)), int(engine.state[BEST]))
-        assert engine._least_total(joined) == least
+        assert engine._least_total(joined.targets) == least
         assert better.bound <= engine.state[BEST] / least
 
     searched(engine, ARASettings(first_weight=10), on_improved=report)
 
 
-@pytest.mark.parametrize("costs", [PLAIN, DEAR])
+@pytest.mark.parametrize("costs", [PLAIN, COSTLY])
 def test_all_iterations_together_expand_less_than_searches_from_scratch(
     costs: CostSettings,
 ) -> None:
@@ -282,10 +282,10 @@ def test_all_iterations_together_expand_less_than_searches_from_scratch(
     assert total < 2 * best
 
 
-def test_the_bound_asked_for_is_enough() -> None:
+def test_the_search_ends_at_the_final_bound() -> None:
     stopped = []
     for seed in range(12):
-        costmap = costmap_of(seed, DEAR)
+        costmap = costmap_of(seed, COSTLY)
         found, reports = searched(ARA(costmap), ARASettings(final_bound=1.3))
         check(costmap, found, reports)
         if found is not None:
@@ -298,8 +298,8 @@ def test_the_bound_asked_for_is_enough() -> None:
 
 def test_slices_and_a_growing_heap_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = [searched(ARA(costmap_of(seed))) for seed in range(6)]
-    monkeypatch.setattr("planners.search.ara.SLICE", 7)
-    monkeypatch.setattr("planners.search.ara.FIRST_ROOM", 9)
+    monkeypatch.setattr(ARA, "slice_size", 7)
+    monkeypatch.setattr(ARA, "first_room", 9)
     for seed, (_, reports) in enumerate(whole):
         _, sliced = searched(ARA(costmap_of(seed)))
         assert summary(sliced) == summary(reports)
@@ -310,7 +310,7 @@ def summary(reports: list[Improvement]) -> list[tuple[float, float, list[list[fl
 
 
 def test_one_engine_serves_many_queries() -> None:
-    costmap = costmap_of(3, DEAR)
+    costmap = costmap_of(3, COSTLY)
     shared, rng = ARA(costmap), np.random.default_rng(3)
     places = costmap.window.cell_to_world(np.argwhere(costmap.traversable))
     for a, b in rng.choice(places, (20, 2)).tolist():
@@ -322,8 +322,8 @@ def test_one_engine_serves_many_queries() -> None:
             assert again[1:] == fresh[1:]
 
 
-@pytest.mark.parametrize("costs", [PLAIN, DEAR])
-def test_start_and_goal_in_one_place_are_joined_at_once(costs: CostSettings) -> None:
+@pytest.mark.parametrize("costs", [PLAIN, COSTLY])
+def test_start_and_goal_in_one_place_are_joined_directly(costs: CostSettings) -> None:
     problem = PlanningProblem(
         grid_of(free_field(32, 32)), start=(5.5, 5.5), goal=(5.5, 5.5), footprint=1, costs=costs
     )
@@ -353,7 +353,7 @@ def test_settings_out_of_range_are_refused_by_name(values: dict[str, float]) -> 
         ARASettings(**values)
 
 
-def test_a_mark_has_room_for_what_it_says() -> None:
+def test_the_parts_of_a_mark_do_not_overlap() -> None:
     assert CAME | WAITS < MARK
     assert CAME & ROOT
     assert CAME & WAITS == 0

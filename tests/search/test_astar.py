@@ -40,7 +40,7 @@ def mazes(seed: int, *, share: float = 0.35, side: int = 70) -> Bools:
 
 
 def cost_or_none(problem: PlanningProblem) -> float | None:
-    """Return the length of the route, or None where there is none."""
+    """Return the length of the route, or None if there is none."""
     try:
         return plan(problem).length
     except NoRouteError:
@@ -56,7 +56,7 @@ def test_cost_is_dijkstras_on_the_oracles_graph(
     free = np.argwhere(~blocked)
     assume(len(free) > 0)
     start, goal = (free[data.draw(st.integers(0, len(free) - 1))] for _ in range(2))
-    # Beyond the drawn cells all is unknown, out to the tile's border and further.
+    # All cells beyond the drawn ones are unknown.
     outside = np.pad(blocked, 1, constant_values=True)
     expected = shortest_lengths(outside, tuple(start + 1), radius)[tuple(goal + 1)]
     got = cost_or_none(
@@ -94,8 +94,8 @@ def test_slices_and_a_growing_heap_change_nothing(
     grid = grid_of(np.where(mazes(seed), BLOCKED, FREE))
     problem = PlanningProblem(grid, start=(1.7, 1.6), goal=(68.2, 68.4), footprint=0.0)
     whole = plan(problem)
-    monkeypatch.setattr("planners.search.astar.SLICE", 7)
-    monkeypatch.setattr("planners.search.astar.FIRST_ROOM", 9)
+    monkeypatch.setattr(AStar, "slice_size", 7)
+    monkeypatch.setattr(AStar, "first_room", 9)
     sliced = plan(problem)
     np.testing.assert_array_equal(sliced.waypoints, whole.waypoints)
     assert sliced.expanded == whole.expanded
@@ -124,7 +124,7 @@ def test_no_corner_is_cut_at_radius_zero() -> None:
 
 
 def across(text: str) -> PlanningProblem:
-    """Return the problem to get from the lower left to the upper right of two by two cells."""
+    """Return a problem from the lower left to the upper right of two by two cells."""
     return PlanningProblem(
         grid_of(drawing(text)),
         start=(0.5, 0.5),
@@ -134,7 +134,7 @@ def across(text: str) -> PlanningProblem:
     )
 
 
-def test_a_start_off_its_cells_centre_is_joined_by_a_straight_piece() -> None:
+def test_a_start_beside_its_cells_centre_is_joined_by_a_straight_piece() -> None:
     grid = grid_of(free_field(64, 64))
     route = plan(PlanningProblem(grid, start=(5.9, 8.5), goal=(20.5, 8.5), footprint=1.0))
     assert route.length == pytest.approx(14.6)
@@ -180,7 +180,7 @@ def test_waypoints_turn_at_every_inner_point() -> None:
     assert (np.abs(turns) > 1e-6).all()
 
 
-def dear_problem(seed: int, goal: tuple[float, float] = (29.5, 29.5)) -> PlanningProblem:
+def costly_problem(seed: int, goal: tuple[float, float] = (29.5, 29.5)) -> PlanningProblem:
     """Return a problem on a map whose cells differ in confidence."""
     rng = np.random.default_rng(seed)
     z = np.where(rng.random((32, 32)) < 0.2, BLOCKED, -rng.uniform(0.05, 1.0, (32, 32)))
@@ -213,8 +213,8 @@ def dijkstra_cost(costmap: Costmap) -> float:
 
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("planner", ["astar", "dijkstra"])
-def test_dear_cells_are_weighed_as_on_the_oracles_graph(seed: int, planner: str) -> None:
-    problem = dear_problem(seed)
+def test_costs_of_cells_are_those_on_the_oracles_graph(seed: int, planner: str) -> None:
+    problem = costly_problem(seed)
     expected = dijkstra_cost(Costmap.of(problem))
     if np.isinf(expected):
         with pytest.raises(EnclosedError, match="no route"):
@@ -226,15 +226,15 @@ def test_dear_cells_are_weighed_as_on_the_oracles_graph(seed: int, planner: str)
         assert route.bound == 1.0
 
 
-def test_the_estimate_saves_work_and_dijkstras_search_has_none() -> None:
-    problem = dear_problem(1, goal=(15.5, 9.5))
+def test_the_estimate_reduces_expansions() -> None:
+    problem = costly_problem(1, goal=(15.5, 9.5))
     assert plan(problem, "astar").expanded < plan(problem, "dijkstra").expanded
 
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("weight", [1.0, 1.2, 2.5, 10.0])
 def test_weighted_astar_keeps_its_bound(seed: int, weight: float) -> None:
-    problem = dear_problem(seed)
+    problem = costly_problem(seed)
     try:
         best = plan(problem)
     except EnclosedError:
@@ -247,7 +247,7 @@ def test_weighted_astar_keeps_its_bound(seed: int, weight: float) -> None:
     assert weight - 1 / 256 <= route.bound <= weight
 
 
-def test_weighted_astar_expands_less_where_the_way_is_open() -> None:
+def test_weighted_astar_expands_less_on_open_maps() -> None:
     grid = grid_of(np.where(mazes(2, share=0.1), BLOCKED, FREE))
     problem = PlanningProblem(grid, start=(1.5, 1.5), goal=(68.5, 60.5), footprint=0.0)
     assert plan(problem, "weighted_astar", weight=3).expanded < plan(problem).expanded / 2
@@ -255,4 +255,4 @@ def test_weighted_astar_expands_less_where_the_way_is_open() -> None:
 
 def test_a_weight_below_one_is_refused() -> None:
     with pytest.raises(SettingsError, match="weight: expected greater than or equal to 1"):
-        plan(dear_problem(0), "weighted_astar", weight=0.5)
+        plan(costly_problem(0), "weighted_astar", weight=0.5)

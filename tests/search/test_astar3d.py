@@ -66,7 +66,7 @@ def search(problem: PlanningProblem) -> SearchResult | None:
 
 
 def shortest_lengths(traversable: Bools, source: tuple[int, ...]) -> Floats:
-    """Return the lengths of the shortest ways from a voxel to every other; inf for none."""
+    """Return the lengths of the shortest paths from a voxel to all others; inf if there is none."""
     edges = []
     for a in np.ndindex(traversable.shape):
         for step in itertools.product((-1, 0, 1), repeat=3):
@@ -85,7 +85,7 @@ def shortest_lengths(traversable: Bools, source: tuple[int, ...]) -> Floats:
 
 
 def sampled_distance(a: Floats, b: Floats, lower: Floats, upper: Floats) -> float:
-    """Return the distance of a segment to a box, too large by a 2000th of its length at most."""
+    """Return the distance of a segment to a box, at most 1/2000 of its length too large."""
     points = a + np.linspace(0.0, 1.0, 2001)[:, None] * (b - a)
     gaps = np.maximum(np.maximum(lower - points, points - upper), 0.0)
     return float(np.sqrt((gaps**2).sum(axis=1)).min())
@@ -107,7 +107,7 @@ def test_squared_distances_are_those_to_the_nearest_blocked_cube(blocked: Bools,
 
 @given(masks(), st.sampled_from(RADII))
 @settings(max_examples=40)
-def test_the_ball_may_be_where_its_clearance_is_enough(blocked: Bools, radius: float) -> None:
+def test_voxels_of_enough_clearance_are_traversable(blocked: Bools, radius: float) -> None:
     assume(not blocked.all())
     voxels = Voxels.of(posed(blocked, (0.5, 0.5, 0.5), (0.5, 0.5, 0.5), radius))
     assert voxels.blocked.sum() == voxels.blocked.size - (~blocked).sum()
@@ -143,7 +143,9 @@ def test_unknown_voxels_near_the_start_count_as_free() -> None:
         ),
     ],
 )
-def test_what_voxels_cannot_hold_is_refused(changes: dict[str, Any], message: str) -> None:
+def test_problems_that_voxels_do_not_support_are_refused(
+    changes: dict[str, Any], message: str
+) -> None:
     asked: dict[str, Any] = {
         "grid": cubes(np.zeros((2, 2, 2), dtype=bool)),
         "start": (1, 1, 1),
@@ -158,7 +160,7 @@ def test_what_voxels_cannot_hold_is_refused(changes: dict[str, Any], message: st
 
 @given(rngs(), st.booleans())
 @settings(max_examples=60)
-def test_both_ways_to_measure_find_the_distance_of_segment_and_cube(
+def test_both_methods_find_the_distance_of_segment_and_cube(
     rng: np.random.Generator, along_axes: bool
 ) -> None:
     a, b = rng.uniform(-3, 3, (2, 3))
@@ -211,7 +213,7 @@ def test_lengths_are_dijkstras_on_the_oracles_graph(
 
 @given(st.integers(0, 2**32 - 1))
 @settings(max_examples=10)
-def test_leaving_out_needless_moves_loses_no_optimum(seed: int) -> None:
+def test_pruned_moves_preserve_optimality(seed: int) -> None:
     rng = np.random.default_rng(seed)
     blocked = rng.random((9, 9, 9)) < rng.uniform(0.05, 0.4)
     blocked[0, 0, 0] = False
@@ -281,8 +283,8 @@ def test_slices_a_growing_heap_and_earlier_queries_change_nothing(
     pairs = [ends(rng, blocked) for _ in range(15)]
     problem = posed(blocked, *pairs[0], 0.0)
     whole = [AStar3D(Voxels.of(problem)).search(*ask(pair), SearchSettings()) for pair in pairs]
-    monkeypatch.setattr("planners.search.astar3d.SLICE", 7)
-    monkeypatch.setattr("planners.search.astar3d.FIRST_ROOM", 30)
+    monkeypatch.setattr(AStar3D, "slice_size", 7)
+    monkeypatch.setattr(AStar3D, "first_room", 30)
     engine = AStar3D(Voxels.of(problem))
     for pair, expected in zip(pairs, whole, strict=True):
         found = engine.search(*ask(pair), SearchSettings())
@@ -363,7 +365,7 @@ def test_a_line_that_keeps_its_distance_passes() -> None:
 
 
 @pytest.mark.parametrize(("end", "name"), [(0, "start"), (-1, "goal")])
-def test_a_line_that_ends_elsewhere_is_found(end: int, name: str) -> None:
+def test_a_line_that_ends_at_another_place_is_found(end: int, name: str) -> None:
     problem = room()
     waypoints = np.array([problem.start, (4, 9.5, 8.5), (13, 9.5, 8.5), problem.goal])
     waypoints[end, 2] += 1e-6
@@ -384,7 +386,7 @@ def test_a_point_may_go_along_a_cube_and_not_through_it() -> None:
                 audit(problem, line)
 
 
-def test_unknown_voxels_may_be_entered_where_that_was_asked_for() -> None:
+def test_unknown_voxels_may_be_entered_if_requested() -> None:
     grid = cubes(np.zeros((16, 16, 16), dtype=bool))
     grid.tile((0, 0, 0)).count[8, 8, 8] = 0
     problem = PlanningProblem(

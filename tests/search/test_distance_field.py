@@ -22,8 +22,9 @@ from planners.costmap.endpoints import ends_of
 from planners.costmap.kernels.moves import COLS, ONE, ROWS
 from planners.search.astar import AStar, AStarSettings
 from planners.search.distance_field import distance_field, reachable
+from planners.search.grid_search import GridSearch
 
-DEAR = CostSettings(clearance_weight=9.0, inflation_radius=3.0, confidence_weight=40.0)
+COSTLY = CostSettings(clearance_weight=9.0, inflation_radius=3.0, confidence_weight=40.0)
 RADII = [0.0, 0.5, 1.0]
 
 
@@ -38,7 +39,7 @@ def problem_on(blocked: Bools, radius: float = 0.0) -> PlanningProblem:
 
 
 def drawn(seed: int, side: int = 24) -> PlanningProblem:
-    """Return a random map of cells of many confidences."""
+    """Return a random map of cells of various confidences."""
     rng = np.random.default_rng(seed)
     blocked = rng.random((side, side)) < 0.25
     problem = problem_on(blocked)
@@ -63,13 +64,13 @@ def test_distances_are_those_of_the_oracles_graph(
     costmap = Costmap.of(problem_on(blocked, radius))
     field = inside(costmap, distance_field(costmap, (col + 0.5, row + 0.5)), blocked.shape)
     expected = shortest_lengths(ringed(blocked), (row + 1, col + 1), radius)[1:-1, 1:-1]
-    if not np.isfinite(field[row, col]):  # the oracle's graph has its source anyhow
+    if not np.isfinite(field[row, col]):  # the oracle's graph always contains its source
         expected[row, col] = np.inf
         assert not costmap.traversable[tuple(np.array([row, col]) - costmap.lower_cell)]
     np.testing.assert_allclose(field, expected, rtol=0, atol=1e-6)
 
 
-@given(st.integers(0, 2**32 - 1), st.sampled_from([CostSettings(), DEAR]))
+@given(st.integers(0, 2**32 - 1), st.sampled_from([CostSettings(), COSTLY]))
 @settings(max_examples=20)
 def test_a_cells_cost_is_dijkstras_over_the_costmaps_steps(seed: int, costs: CostSettings) -> None:
     costmap = Costmap.of(replace(drawn(seed), costs=costs))
@@ -79,7 +80,7 @@ def test_a_cells_cost_is_dijkstras_over_the_costmaps_steps(seed: int, costs: Cos
 
 
 def csgraph_field(costmap: Costmap, xy: tuple[float, float]) -> Floats:
-    """Return what `distance_field` returns, from a sparse graph that NumPy builds."""
+    """Return the result of `distance_field`, from a sparse graph that NumPy builds."""
     traversable, size = np.pad(costmap.traversable, 1), costmap.traversable.size
     number, price = (
         np.arange(size).reshape(costmap.traversable.shape),
@@ -106,7 +107,7 @@ def csgraph_field(costmap: Costmap, xy: tuple[float, float]) -> Floats:
     return costs * costmap.window.resolution
 
 
-@given(st.integers(0, 2**32 - 1), st.sampled_from([CostSettings(), DEAR]))
+@given(st.integers(0, 2**32 - 1), st.sampled_from([CostSettings(), COSTLY]))
 @settings(max_examples=10)
 def test_a_cells_cost_is_that_of_the_route_to_its_centre(seed: int, costs: CostSettings) -> None:
     costmap = Costmap.of(replace(drawn(seed), costs=costs))
@@ -124,7 +125,7 @@ def test_a_cells_cost_is_that_of_the_route_to_its_centre(seed: int, costs: CostS
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from(RADII))
 @settings(max_examples=20)
-def test_reachable_is_what_hangs_together_and_where_the_distance_is_finite(
+def test_reachable_cells_are_the_connected_ones_of_finite_distance(
     seed: int, radius: float
 ) -> None:
     blocked = np.random.default_rng(seed).random((30, 30)) < 0.05 + 0.3 * (radius == 0)
@@ -133,7 +134,7 @@ def test_reachable_is_what_hangs_together_and_where_the_distance_is_finite(
     mask = reachable(problem, xy)
     np.testing.assert_array_equal(mask, np.isfinite(distance_field(problem, xy)))
     costmap = Costmap.of(problem)
-    parts, _ = ndimage.label(costmap.traversable)  # diagonal moves join nothing else
+    parts, _ = ndimage.label(costmap.traversable)  # diagonal moves join no further cells
     joined = parts[tuple(ends_of(costmap, xy, xy).sources[:, :2].T)]
     np.testing.assert_array_equal(mask, np.isin(parts, joined[joined > 0]))
 
@@ -148,14 +149,14 @@ def test_a_narrower_robot_reaches_more() -> None:
 
 
 def test_slices_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    costmap = Costmap.of(replace(drawn(4), costs=DEAR))
+    costmap = Costmap.of(replace(drawn(4), costs=COSTLY))
     whole = distance_field(costmap, (3.3, 4.1))
     assert np.isfinite(whole).sum() > 100
-    monkeypatch.setattr("planners.search.distance_field.SLICE", 3)
+    monkeypatch.setattr(GridSearch, "slice_size", 3)
     np.testing.assert_array_equal(distance_field(costmap, (3.3, 4.1)), whole)
 
 
-def test_cells_have_their_size() -> None:
+def test_distances_are_in_metres() -> None:
     grid = grid_of(free_field(40, 40), resolution=0.25, origin=(3.0, -2.0))
     problem = PlanningProblem(grid, start=(5, 0), goal=(5, 0), footprint=0.3)
     field = distance_field(problem, (5.125, 0.125, 1.0))
@@ -165,7 +166,7 @@ def test_cells_have_their_size() -> None:
 
 
 @pytest.mark.parametrize("source", [(1.5, 1.5), (-40.0, 3.0)])
-def test_from_a_place_where_the_footprint_does_not_fit_nothing_is_reached(
+def test_nothing_is_reached_from_a_place_where_the_footprint_does_not_fit(
     source: tuple[float, float],
 ) -> None:
     z = free_field(20, 20)
@@ -176,7 +177,7 @@ def test_from_a_place_where_the_footprint_does_not_fit_nothing_is_reached(
 
 
 @pytest.mark.parametrize("source", [(np.nan, 1.0), (1.0,), ("east", 2.0), 3.0])
-def test_a_source_that_is_no_place_is_refused(source: object) -> None:
+def test_a_source_that_is_not_a_position_is_refused(source: object) -> None:
     problem = problem_on(np.zeros((9, 9), dtype=np.bool_))
     with pytest.raises(ProblemError, match=r"source: expected x, y \[m\], finite, got"):
         distance_field(problem, source)  # type: ignore[arg-type]
@@ -197,6 +198,6 @@ def test_a_time_limit_of_zero_is_over_at_once() -> None:
 
 
 @pytest.mark.parametrize("radius", [-1.0, np.nan, np.inf])
-def test_no_radius_is_below_0_or_not_finite(radius: float) -> None:
+def test_a_radius_below_0_or_not_finite_is_refused(radius: float) -> None:
     with pytest.raises(ProblemError, match=f"radius: expected .* 0 or more .*, got {radius}"):
         reachable(problem_on(np.zeros((4, 4), dtype=np.bool_)), (0.5, 0.5), radius=radius)

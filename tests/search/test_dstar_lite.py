@@ -1,4 +1,4 @@
-"""D* Lite: whatever changes, the cost is that of a search from scratch, for less work."""
+"""D* Lite: after any changes, the cost is that of a search from scratch, with less work."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from planners.costmap.endpoints import ends_of
 from planners.costmap.kernels.moves import COLS, ONE, ROWS
 from planners.search.astar import AStar, AStarSettings
 from planners.search.dstar_lite import DStarLite, DStarLiteSettings
-from planners.search.kernels.astar import FAR
-from planners.search.kernels.dstar_lite import BEST, G
+from planners.search.kernels.astar import BEST, FAR
+from planners.search.kernels.dstar_lite import G
 
 SIDE = 10
-GOAL = (1.9, 2.8)  # off its cell's centre: joined to four
-DEAR = CostSettings(clearance_weight=2.0, inflation_radius=2.5, confidence_weight=1.0)
+GOAL = (1.9, 2.8)  # beside its cell's centre: joined to four cells
+COSTLY = CostSettings(clearance_weight=2.0, inflation_radius=2.5, confidence_weight=1.0)
 
 cells = st.tuples(st.integers(0, SIDE - 1), st.integers(0, SIDE - 1))
 values = st.sampled_from([FREE, FREE, BLOCKED, -0.25])
@@ -34,7 +34,7 @@ places = st.tuples(st.floats(0.5, SIDE - 0.5), st.floats(0.5, SIDE - 0.5))
 
 
 def put(grid: ConfidenceGrid, row: int, col: int, confidence: float) -> None:
-    """Let a cell of the grid be of a confidence, seen once."""
+    """Set the confidence of a cell of the grid, observed once."""
     (i, row), (j, col) = divmod(row, 64), divmod(col, 64)
     tile = grid.tile((i, j))
     tile.confidence[row, col] = confidence
@@ -55,7 +55,7 @@ def problem_on(
 
 
 def cost_of(engine: DStarLite, start: tuple[float, float]) -> float:
-    """Return the cost of the best route [cells]; inf for none, -1 where it is a straight piece."""
+    """Return the cost of the best route [cells]; inf for none, -1 for a straight piece."""
     found = engine.search(start, GOAL, DStarLiteSettings())
     if ends_of(engine.costmap, start, GOAL).direct:
         return -1.0
@@ -63,7 +63,7 @@ def cost_of(engine: DStarLite, start: tuple[float, float]) -> float:
 
 
 def expected_cost(costmap: Costmap, start: tuple[float, float]) -> float:
-    """Return the same, from SciPy's Dijkstra on the costmap's own stand, costs and steps."""
+    """Return the same, from SciPy's Dijkstra on the costmap's cells, costs and steps."""
     ends = ends_of(costmap, start, GOAL)
     if ends.direct:
         return -1.0
@@ -89,7 +89,7 @@ def costs_from(costmap: Costmap, sources: Ints) -> Floats:
                     step = costmap.steps[k % 2, price]
                     edges.append((number[row, [col]], number[i, [j]], np.array([step])))
     tails, heads, costs = (np.concatenate(column) for column in zip(*edges, strict=True))
-    # 2^-60 of a cell: a link of no length would be no edge.
+    # 2^-60 of a cell: an edge of length 0 would be none.
     graph = coo_array((costs / ONE + 2.0**-60, (tails, heads)), shape=(size + 1, size + 1))
     distances: Floats = dijkstra(graph.tocsr(), indices=size)[:size].reshape(traversable.shape)
     return distances
@@ -98,7 +98,7 @@ def costs_from(costmap: Costmap, sources: Ints) -> Floats:
 @given(
     st.lists(st.tuples(changes, places), min_size=1, max_size=6),
     st.sampled_from([0.0, 0.5]),
-    st.sampled_from([None, DEAR]),
+    st.sampled_from([None, COSTLY]),
 )
 @settings(max_examples=40, deadline=None)
 def test_after_any_changes_the_cost_is_dijkstras(
@@ -117,7 +117,7 @@ def test_after_any_changes_the_cost_is_dijkstras(
         assert cost_of(engine, start) == pytest.approx(expected_cost(costmap, start), abs=1e-7)
 
 
-@given(st.integers(0, 2**32 - 1), st.sampled_from([None, DEAR]))
+@given(st.integers(0, 2**32 - 1), st.sampled_from([None, COSTLY]))
 @settings(max_examples=25)
 def test_on_a_growing_map_the_cost_is_exactly_that_from_scratch(
     seed: int, costs: CostSettings | None
@@ -147,14 +147,14 @@ def test_on_a_shrinking_or_moving_window_the_cost_is_exactly_that_from_scratch(s
     engine = DStarLite(Costmap.of(problem))
     for _ in range(6):
         start = tuple(rng.uniform(0.5, SIDE - 0.5, 2).tolist())
-        around = float(rng.uniform(0, 30))  # the window reaches as far around the start
+        around = float(rng.uniform(0, 30))  # [m] the window extends this far around the start
         costmap = Costmap.of(replace(problem, start=start, clear_start_radius=around))
         engine.update(costmap)
         assert cost_of(engine, start) == cost_of(DStarLite(costmap), start)
 
 
-def test_a_goal_that_the_window_no_longer_holds_is_found_again_when_it_does() -> None:
-    beyond = (5.5, 80.3)  # of the tile; the costmap holds it while the cleared start reaches there
+def test_a_goal_outside_of_the_window_is_found_again_once_inside() -> None:
+    beyond = (5.5, 80.3)  # of the tile; the costmap contains it while the cleared start does
     problem = replace(problem_on(grid_of(free_field(SIDE, SIDE))), unknown="allow", goal=beyond)
     costmaps = [
         Costmap.of(replace(problem, clear_start=True, clear_start_radius=radius))
@@ -167,7 +167,7 @@ def test_a_goal_that_the_window_no_longer_holds_is_found_again_when_it_does() ->
         assert (found is not None) == reached
 
 
-@given(st.integers(0, 2**32 - 1), st.sampled_from([None, DEAR]))
+@given(st.integers(0, 2**32 - 1), st.sampled_from([None, COSTLY]))
 @settings(max_examples=25)
 def test_a_reversed_query_costs_the_same(seed: int, costs: CostSettings | None) -> None:
     rng = np.random.default_rng(seed)
@@ -215,7 +215,7 @@ def test_a_change_before_the_robot_costs_fewer_expansions_than_a_search_from_scr
 
 
 def rooms() -> tuple[ConfidenceGrid, PlanningProblem]:
-    """Return four rooms, joined by doors, and the way from one to the one across."""
+    """Return four rooms, joined by doors, and a problem from one to the opposite one."""
     z = free_field(64, 64)
     z[31:33] = z[:, 31:33] = BLOCKED
     for door in (12, 50):
@@ -245,7 +245,7 @@ def test_a_robot_that_drives_its_route_expands_nothing_more() -> None:
         assert found.expanded == 0
 
 
-def test_an_enclosed_robot_has_no_route_until_its_fence_opens() -> None:
+def test_an_enclosed_robot_has_no_route_until_its_enclosure_opens() -> None:
     grid = grid_of(
         drawing("""
         ..........
@@ -270,7 +270,7 @@ def test_an_enclosed_robot_has_no_route_until_its_fence_opens() -> None:
     assert cost_of(engine, inside) == np.inf
 
 
-def test_a_goal_that_is_built_over_and_cleared_again_is_found_again() -> None:
+def test_a_goal_that_is_blocked_and_cleared_again_is_found_again() -> None:
     grid = grid_of(free_field(SIDE, SIDE))
     problem = problem_on(grid)
     engine = DStarLite(Costmap.of(problem))
@@ -280,7 +280,7 @@ def test_a_goal_that_is_built_over_and_cleared_again_is_found_again() -> None:
         assert (cost_of(engine, (8.5, 8.5)) < np.inf) == reached
 
 
-def test_another_goal_begins_anew() -> None:
+def test_another_goal_is_searched_from_scratch() -> None:
     _, problem = rooms()
     engine = DStarLite(Costmap.of(problem))
     for goal in (GOAL, (3.5, 60.5), (60.5, 2.5), GOAL):
@@ -292,9 +292,9 @@ def test_another_goal_begins_anew() -> None:
         assert found.waypoints[-1].tolist() == list(goal)
 
 
-def test_other_prices_begin_anew() -> None:
+def test_another_weight_of_costs_is_searched_from_scratch() -> None:
     _, problem = rooms()
-    engine = DStarLite(Costmap.of(replace(problem, costs=DEAR)))
+    engine = DStarLite(Costmap.of(replace(problem, costs=COSTLY)))
     engine.search(problem.start_xy, GOAL, DStarLiteSettings())
     doubled = CostSettings(clearance_weight=4.0, inflation_radius=2.5, confidence_weight=2.0)
     costmap = Costmap.of(replace(problem, costs=doubled))
@@ -309,8 +309,8 @@ def test_other_prices_begin_anew() -> None:
 
 def test_slices_and_a_growing_heap_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = driven()
-    monkeypatch.setattr("planners.search.dstar_lite.SLICE", 7)
-    monkeypatch.setattr("planners.search.dstar_lite.FIRST_ROOM", 10)
+    monkeypatch.setattr(DStarLite, "slice_size", 7)
+    monkeypatch.setattr(DStarLite, "first_room", 10)
     assert driven() == whole
 
 
@@ -331,14 +331,14 @@ def driven() -> list[float]:
     return costs
 
 
-def test_a_search_that_ran_out_of_time_goes_on_where_it_ended(
+def test_a_search_after_a_time_limit_continues(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     _, problem = rooms()
     expected = DStarLite(Costmap.of(problem)).search(problem.start_xy, GOAL, DStarLiteSettings())
     assert expected is not None
     engine = DStarLite(Costmap.of(problem))
-    monkeypatch.setattr("planners.search.dstar_lite.SLICE", 1)
+    monkeypatch.setattr(DStarLite, "slice_size", 1)
     with pytest.raises(TimeLimitError, match=r"dstar_lite: no route within time_limit = 0.0002 s"):
         engine.search(problem.start_xy, GOAL, DStarLiteSettings(time_limit=2e-4))
     found = engine.search(problem.start_xy, GOAL, DStarLiteSettings(time_limit=None))
@@ -353,9 +353,9 @@ def test_a_time_limit_of_zero_is_over_at_once() -> None:
         DStarLite(Costmap.of(problem)).search(GOAL, GOAL, DStarLiteSettings(time_limit=0))
 
 
-def test_what_the_search_settled_on_is_the_distance_to_the_goal() -> None:
+def test_settled_costs_are_the_distances_to_the_goal() -> None:
     _, problem = rooms()
-    costmap = Costmap.of(replace(problem, costs=DEAR))
+    costmap = Costmap.of(replace(problem, costs=COSTLY))
     engine = DStarLite(costmap)
     engine.search(problem.start_xy, GOAL, DStarLiteSettings())
     settled = engine.labels[:, G].reshape(costmap.traversable.shape)

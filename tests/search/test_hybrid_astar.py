@@ -1,4 +1,4 @@
-"""Hybrid A*: routes that can be steered, through what is just wide enough, or none."""
+"""Hybrid A*: routes of bounded curvature, also through the narrowest passages."""
 
 from __future__ import annotations
 
@@ -53,9 +53,9 @@ def costmap_of(
     )
 
 
-def routed(costmap: Costmap, start: Place, goal: Place, **told: Any) -> SearchResult | None:
+def routed(costmap: Costmap, start: Place, goal: Place, **options: Any) -> SearchResult | None:
     """Return the route between two poses, checked, or None if there is none."""
-    chosen = HybridAStarSettings(**told)
+    chosen = HybridAStarSettings(**options)
     found = HybridAStar(costmap).search(start, goal, chosen)
     if found is not None:
         check_steered(costmap, found, (start, goal), chosen)
@@ -72,7 +72,7 @@ def field(rows: int = 48, cols: int = 48) -> Bools:
 
 
 def rooms(rng: np.random.Generator) -> Bools:
-    """Return four rooms with doors between them, and a few things that stand about."""
+    """Return four rooms with doors between them, and a few obstacles."""
     blocked = field(64, 64)
     blocked[31:33] = blocked[:, 31:33] = True
     for low, high in ((0, 31), (33, 64)):
@@ -87,9 +87,7 @@ def rooms(rng: np.random.Generator) -> Bools:
 @pytest.mark.parametrize("motion", ["dubins", "reeds_shepp"])
 @given(rng=rngs())
 @settings(max_examples=15)
-def test_where_nothing_is_in_the_way_the_route_is_the_curve(
-    motion: Motion, rng: np.random.Generator
-) -> None:
+def test_without_obstacles_the_route_is_the_curve(motion: Motion, rng: np.random.Generator) -> None:
     start, goal = rng.uniform((4, 4, -4), (8, 8, 4), (2, 3)).tolist()
     free = {"reverse_penalty": 1, "gear_change_penalty": 0, "steering_penalty": 0}
     costmap = costmap_of(field(), 0.2)
@@ -109,12 +107,12 @@ def test_routes_through_rooms_can_be_steered_and_touch_nothing(
     for seed in range(3):
         rng = np.random.default_rng(seed)
         costmap = costmap_of(rooms(rng), footprint)
-        engine, told = HybridAStar(costmap), HybridAStarSettings(motion=motion, time_limit=None)
+        engine, options = HybridAStar(costmap), HybridAStarSettings(motion=motion, time_limit=None)
         for _ in range(2):
             ends = clear_poses(engine, rng)
-            route = engine.search(*ends, told)
+            route = engine.search(*ends, options)
             if route is not None:
-                check_steered(costmap, route, ends, told)
+                check_steered(costmap, route, ends, options)
                 found += 1
     assert found >= (4 if motion == "reeds_shepp" else 2)
 
@@ -146,7 +144,7 @@ STREET = """
 """
 
 
-def test_a_car_parks_in_a_gap_by_driving_backwards() -> None:
+def test_a_car_parks_in_a_gap_by_driving_backward() -> None:
     street = costmap_of(drawing(STREET) == BLOCKED, CAR)
     start, goal = (1.2, 2.1, 0.0), (3.2, 0.75, 0.0)
     parked = routed(street, start, goal, turning_radius=1.5)
@@ -160,7 +158,7 @@ def test_a_car_parks_in_a_gap_by_driving_backwards() -> None:
 
 def test_a_corridor_as_wide_as_the_car_is_passed_straight_only() -> None:
     blocked = field(24, 64)
-    blocked[:10, 20:40] = blocked[14:, 20:40] = True  # 1 m is left
+    blocked[:10, 20:40] = blocked[14:, 20:40] = True  # 1 m remains free
     costmap = costmap_of(blocked, [(-0.5, -0.5), (1.0, -0.5), (1.0, 0.5), (-0.5, 0.5)])
     through = routed(costmap, (1.0, 3.0, 0.0), (14.0, 3.0, 0.0))
     assert length(through) == pytest.approx(13.0)
@@ -169,13 +167,13 @@ def test_a_corridor_as_wide_as_the_car_is_passed_straight_only() -> None:
 
 
 @pytest.mark.parametrize("footprint", FOOTPRINTS)
-def test_a_closed_pocket_has_no_way_in(footprint: Any) -> None:
+def test_a_closed_pocket_cannot_be_reached(footprint: Any) -> None:
     blocked = field()
     blocked[24:, 24] = blocked[24, 24:] = True
     assert routed(costmap_of(blocked, footprint), (2, 2, 0), (9, 9, 0)) is None
 
 
-def test_a_pose_that_touches_what_is_blocked_has_no_route() -> None:
+def test_a_pose_that_touches_blocked_cells_has_no_route() -> None:
     blocked = field()
     blocked[24, 24] = True
     costmap = costmap_of(blocked, CAR)
@@ -185,7 +183,7 @@ def test_a_pose_that_touches_what_is_blocked_has_no_route() -> None:
     assert routed(costmap, (2, 2, 0), (across[0], across[1], math.pi)) is not None
 
 
-def test_to_stay_is_a_route_of_two_equal_poses() -> None:
+def test_equal_start_and_goal_give_two_equal_poses() -> None:
     pose = (5.0, 5.0, 7.0)
     found = routed(costmap_of(field(), CAR), pose, pose)
     assert found is not None
@@ -196,11 +194,11 @@ def test_penalties_decide_between_backing_up_and_turning_around() -> None:
     costmap = costmap_of(field(96, 96), 0.2)
     start, behind = (12.0, 12.0, 0.0), (6.0, 12.0, 0.0)
     assert length(routed(costmap, start, behind)) == pytest.approx(6.0)
-    dear = routed(costmap, start, behind, reverse_penalty=20)
-    assert length(dear) > 7.0
+    costly = routed(costmap, start, behind, reverse_penalty=20)
+    assert length(costly) > 7.0
 
 
-def test_a_dear_strip_is_gone_around() -> None:
+def test_a_costly_strip_is_avoided() -> None:
     z = free_field(48, 48)
     z[10:38, 22:26] = -0.1
     start, goal = (2.0, 6.0, 0.0), (10.0, 6.0, 0.0)
@@ -226,8 +224,8 @@ def test_slices_and_growing_arrays_change_nothing(monkeypatch: pytest.MonkeyPatc
     costmap = costmap_of(rooms(np.random.default_rng(3)), CAR)
     ends = (3.0, 3.0, 0.0), (12.0, 12.5, 1.0)
     whole = routed(costmap, *ends)
-    monkeypatch.setattr("planners.search.hybrid_astar.SLICE", 7)
-    monkeypatch.setattr("planners.search.hybrid_astar.FIRST_ROOM", 4)
+    monkeypatch.setattr(HybridAStar, "slice_size", 7)
+    monkeypatch.setattr(HybridAStar, "first_room", 4)
     sliced = routed(costmap, *ends)
     assert whole is not None
     assert sliced is not None
@@ -250,7 +248,7 @@ def test_one_engine_serves_many_queries() -> None:
 
 
 @pytest.mark.parametrize("goal", [(0, 0), (5, 7), (23, 1)])
-def test_the_field_is_dijkstras_however_far_it_was_grown(goal: tuple[int, int]) -> None:
+def test_the_field_is_dijkstras_after_any_number_of_requests(goal: tuple[int, int]) -> None:
     rng = np.random.default_rng(sum(goal))
     blocked: Bools = rng.random((24, 24)) < 0.3
     blocked[goal] = False
@@ -285,7 +283,7 @@ def field_distances(costmap: Costmap, moves: npt.NDArray[np.uint8], narrow: Bool
     return distances
 
 
-def test_what_is_needed_is_said() -> None:
+def test_errors_name_the_expected_values() -> None:
     engine = HybridAStar(costmap_of(field(), CAR))
     with pytest.raises(ProblemError, match=r"goal: expected x, y \[m\] and yaw \[rad\] for hybrid"):
         engine.search((2, 2, 0), (9, 9), HybridAStarSettings())

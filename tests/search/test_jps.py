@@ -1,4 +1,4 @@
-"""Jump point search: the costs of A*, by fewer steps."""
+"""Jump point search: the costs of A*, with fewer expansions."""
 
 from __future__ import annotations
 
@@ -49,9 +49,9 @@ STEPS = list(zip(ROWS.tolist(), COLS.tolist(), strict=True))
 
 
 class Answer(NamedTuple):
-    cost: float  # inf: no way
+    cost: float  # inf: no path
     expanded: int
-    cells: Ints  # where the way begins, turns and ends
+    cells: Ints  # where the path begins, turns and ends
 
 
 def table_of(moves: Bytes, kind: type[np.signedinteger] = np.int16) -> Jumps:
@@ -94,7 +94,7 @@ class Searcher:
 
 @st.composite
 def grids(draw: st.DrawFn, *, most: int = 400) -> Bools:
-    """Draw where one may stand: up to `most` cells, of words' lengths and beside, open to mazy."""
+    """Draw traversable cells: up to `most`, about whole words long, from open to maze-like."""
     rows = draw(st.sampled_from(LENGTHS))
     cols = draw(st.sampled_from([n for n in LENGTHS if n * rows <= max(most, rows)]))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
@@ -109,7 +109,7 @@ def grids(draw: st.DrawFn, *, most: int = 400) -> Bools:
 
 @st.composite
 def queries(draw: st.DrawFn) -> tuple[Bools, Ints, Ints]:
-    """Draw a grid with sources and targets: up to four of a block, or from anywhere."""
+    """Draw a grid with sources and targets: up to four of a block, or of any cells."""
     traversable = draw(grids())
     cells = np.argwhere(traversable)
     ends = []
@@ -141,7 +141,7 @@ def test_cost_is_dijkstras_and_that_of_the_reverse(
 @pytest.mark.parametrize("plus", [False, True])
 @given(query=queries())
 @settings(max_examples=50)
-def test_the_cells_are_a_way_of_that_cost_and_turn_at_each(
+def test_the_cells_are_a_path_of_that_cost_and_turn_at_each(
     plus: bool, query: tuple[Bools, Ints, Ints]
 ) -> None:
     traversable, sources, targets = query
@@ -247,7 +247,7 @@ def test_a_wall_leaves_no_route_and_the_next_query_is_answered(
 
 
 @pytest.mark.parametrize(("engine_class", "chosen"), ENGINES)
-def test_goals_in_no_cell_that_can_be_left_have_no_route(
+def test_goals_in_enclosed_cells_have_no_route(
     engine_class: type[JPS], chosen: JPSSettings
 ) -> None:
     blocked = np.zeros((9, 9), dtype=bool)
@@ -267,7 +267,7 @@ def test_a_time_limit_of_zero_is_over_at_once(engine_class: type[JPS], name: str
 @pytest.mark.parametrize("engine_class", [JPS, JPSPlus])
 def test_costs_that_differ_are_refused(engine_class: type[JPS]) -> None:
     costmap = costmap_of(free_field(20, 20) > 0, costs=CostSettings(clearance_weight=2.0))
-    with pytest.raises(ProblemError, match=r"planner: expected uniform costs.*Take 'astar'"):
+    with pytest.raises(ProblemError, match=r"planner: expected uniform costs.*Use 'astar'"):
         engine_class(costmap)
 
 
@@ -283,11 +283,11 @@ def test_lengths_are_the_published_optima(name: str, plus: bool) -> None:
         assert search(start, goal).cost / ONE == pytest.approx(rows[i].length, abs=0.01)
 
 
-# Places off the centres
+# Places beside the centres
 
 
 def outcome(problem: PlanningProblem, planner: str) -> tuple[str, object]:
-    """Return the cost of a route, or why there is none."""
+    """Return the cost of a route, or the reason why there is none."""
     try:
         return "cost", pytest.approx(plan(problem, planner).cost, rel=1e-12)
     except NoRouteError as error:
@@ -295,7 +295,7 @@ def outcome(problem: PlanningProblem, planner: str) -> tuple[str, object]:
 
 
 def speckled_problem(rng: np.random.Generator) -> PlanningProblem:
-    """Return a problem between places off the centres, where the footprint fits."""
+    """Return a problem between places beside the centres, where the footprint fits."""
     while True:
         side = int(rng.integers(6, 16))
         z = np.where(rng.random((side, side)) < rng.choice([0.1, 0.25, 0.4]), BLOCKED, FREE)
@@ -309,7 +309,7 @@ def speckled_problem(rng: np.random.Generator) -> PlanningProblem:
 
 
 @pytest.mark.parametrize("planner", ["jps", "jps+"])
-def test_places_off_the_centres_get_the_answers_of_astar(planner: str) -> None:
+def test_places_beside_the_centres_have_the_routes_of_astar(planner: str) -> None:
     rng = np.random.default_rng(5)
     plan(
         PlanningProblem(grid_of(free_field(9, 9)), start=(2, 2), goal=(7, 5), footprint=0.5), "jps"

@@ -42,7 +42,7 @@ choices = st.integers(0, 2**16)
 
 
 def length(engine: Polyanya, start: tuple[float, float], goal: tuple[float, float]) -> float:
-    """Return the length of the route; inf where there is none."""
+    """Return the length of the route; inf if there is none."""
     found = engine.search(start, goal, SETTINGS)
     return math.inf if found is None else length_of(found.waypoints)
 
@@ -150,7 +150,7 @@ def test_polygons_tile_the_squares(traversable: Bools) -> None:
 
 @given(bitmaps(side=12))
 @settings(max_examples=60)
-def test_polygons_are_strictly_convex_and_know_their_neighbours(traversable: Bools) -> None:
+def test_polygons_are_strictly_convex_and_link_their_neighbours(traversable: Bools) -> None:
     mesh = NavigationMesh.of(traversable)
     side = np.arange(len(mesh.corners))
     after = np.where(side + 1 < mesh.first[mesh.owner + 1], side + 1, mesh.first[mesh.owner])
@@ -190,7 +190,7 @@ def rings_of(mesh: NavigationMesh) -> list[shapely.Polygon]:
 
 @given(st.integers(0, 2**32 - 1))
 @settings(max_examples=60)
-def test_the_bound_is_the_shortest_way_through_the_interval(seed: int) -> None:
+def test_the_bound_is_the_shortest_line_through_the_interval(seed: int) -> None:
     rng = np.random.default_rng(seed)
     a, b = np.array([4.0, -3.0]), np.array([4.0, 5.0]) + rng.normal(size=2)
     root, (low, high) = rng.uniform(-2, 2, 2), np.sort(rng.uniform(0, 1, 2))
@@ -198,12 +198,12 @@ def test_the_bound_is_the_shortest_way_through_the_interval(seed: int) -> None:
     cone = np.concatenate([left - root, right - root])
     target = np.array([[*rng.uniform(-9, 15, 2), 0.7]])
     on = right + np.linspace(0, 1, 4001)[:, None] * (left - right)
-    ways = np.hypot(*(on - root).T) + np.hypot(*(on - target[0, :2]).T) + 0.7
+    lengths = np.hypot(*(on - root).T) + np.hypot(*(on - target[0, :2]).T) + 0.7
     got = through(root[0], root[1], cone, a[0], a[1], b[0], b[1], target)
-    assert ways.min() - 1e-3 <= got <= ways.min() + 1e-9
+    assert lengths.min() - 1e-3 <= got <= lengths.min() + 1e-9
 
 
-def test_equally_long_ways_round_obstacles_are_followed_once() -> None:
+def test_equally_long_paths_around_obstacles_are_followed_once() -> None:
     traversable = np.ones((62, 62), dtype=np.bool_)
     for i, j in np.ndindex(15, 15):
         traversable[4 * i + 1 : 4 * i + 3, 4 * j + 1 : 4 * j + 3] = False
@@ -218,8 +218,8 @@ def test_slices_and_growing_room_change_nothing(monkeypatch: pytest.MonkeyPatch)
     ends = centre((1, 1)), centre((58, 58))
     engine = Polyanya(costmap)
     whole = engine.search(*ends, SETTINGS)
-    monkeypatch.setattr("planners.search.polyanya.SLICE", 7)
-    monkeypatch.setattr("planners.search.polyanya.FIRST_ROOM", 9)
+    monkeypatch.setattr(Polyanya, "slice_size", 7)
+    monkeypatch.setattr(Polyanya, "first_room", 9)
     sliced, again = Polyanya(costmap).search(*ends, SETTINGS), engine.search(*ends, SETTINGS)
     for other in (sliced, again):
         assert whole is not None
@@ -253,11 +253,11 @@ def test_a_time_limit_of_zero_is_over_at_once() -> None:
         engine.search((0.5, 0.5), (4.5, 3.5), PolyanyaSettings(time_limit=0))
 
 
-def test_costs_are_refused() -> None:
+def test_non_uniform_costs_are_refused() -> None:
     costs = CostSettings(clearance_weight=1.0)
     grid = grid_of(free_field(8, 8))
     problem = PlanningProblem(grid, start=(4, 4), goal=(5, 5), footprint=1.0, costs=costs)
-    with pytest.raises(ProblemError, match=r"which 'polyanya' needs.*Take 'astar'"):
+    with pytest.raises(ProblemError, match=r"which 'polyanya' needs.*Use 'astar'"):
         Polyanya(Costmap.of(problem))
 
 

@@ -1,4 +1,4 @@
-"""Optimal lengths of the MovingAI benchmark, where its maps are at hand."""
+"""Optimal lengths of the MovingAI benchmark, if its maps are available."""
 
 from __future__ import annotations
 

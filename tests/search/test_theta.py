@@ -1,4 +1,4 @@
-"""Line of sight, Theta* and Lazy Theta*: exact sight, routes as their definition says."""
+"""Line of sight, Theta* and Lazy Theta*: exact visibility, routes as defined."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ from planners.search.theta import LazyTheta, LazyThetaSettings, Theta, ThetaSett
 ENGINES = [(Theta, ThetaSettings()), (LazyTheta, LazyThetaSettings())]
 
 
-def stands(text: str) -> Bools:
-    """Return the cells of a drawing that can be stood on."""
+def traversable_in(text: str) -> Bools:
+    """Return the traversable cells of a drawing."""
     traversable: Bools = drawing(text) == FREE
     return traversable
 
@@ -54,14 +54,14 @@ def test_cells_see_each_other_if_the_line_between_them_is_in_the_region(traversa
 
 
 def test_sight_passes_where_two_squares_meet_in_a_corner() -> None:
-    moves = allowed_moves(stands("#.. ... ..#"))
+    moves = allowed_moves(traversable_in("#.. ... ..#"))
     assert sight(moves, 0, 0, 2, 2)
     assert not sight(moves, 0, 0, 2, 1)
     assert not sight(moves, 0, 1, 1, 2)
 
 
 def test_sight_runs_along_corridors_of_one_cell() -> None:
-    moves = allowed_moves(stands("#.# ... #.#"))
+    moves = allowed_moves(traversable_in("#.# ... #.#"))
     assert sight(moves, 0, 1, 2, 1)
     assert sight(moves, 1, 2, 1, 0)
     assert not sight(moves, 0, 1, 1, 2)
@@ -71,7 +71,7 @@ def test_sight_runs_along_corridors_of_one_cell() -> None:
 @pytest.mark.parametrize(("engine", "options"), ENGINES)
 @given(traversable=bitmaps(), data=st.data())
 @settings(max_examples=30)
-def test_routes_are_those_of_the_twin(
+def test_routes_are_those_of_the_reference(
     engine: type[Theta], options: ThetaSettings, traversable: Bools, data: st.DataObject
 ) -> None:
     cells = np.argwhere(traversable)
@@ -80,7 +80,7 @@ def test_routes_are_those_of_the_twin(
         a, b = (cells[data.draw(st.integers(0, len(cells) - 1))] for _ in range(2))
         found = searching.search(centre(a), centre(b), options)
         if np.abs(a - b).max() <= 1:
-            continue  # within two by two cells, nothing is searched
+            continue  # within two by two cells, there is no search
         expected = twin(allowed_moves(traversable), a, b, lazy=engine.lazy)
         assert (found is None) == (expected is None)
         if found is not None and expected is not None:
@@ -107,7 +107,7 @@ def test_no_route_is_shorter_than_the_shortest_and_all_legs_are_in_sight(
 
 
 def twin(moves: Bytes, start: Ints, goal: Ints, *, lazy: bool) -> list[tuple[int, int]] | None:
-    """Return where Theta* turns [row, col], in plain Python, ties as in the kernel's heap."""
+    """Return where Theta* turns [row, col], in plain Python, with ties as in the kernel's heap."""
     width = moves.shape[1]
     source, target = int(start[0] * width + start[1]), int(goal[0] * width + goal[1])
     cost, parent, closed = {source: 0.0}, {source: source}, set[int]()
@@ -161,8 +161,8 @@ def test_slices_and_a_growing_heap_change_nothing(
     ends = centre((1, 1)), centre((58, 58))
     searching = engine(costmap)
     whole = searching.search(*ends, options)
-    monkeypatch.setattr("planners.search.theta.SLICE", 7)
-    monkeypatch.setattr("planners.search.theta.FIRST_ROOM", 9)
+    monkeypatch.setattr(Theta, "slice_size", 7)
+    monkeypatch.setattr(Theta, "first_room", 9)
     sliced = engine(costmap).search(*ends, options)
     assert whole is not None
     assert sliced is not None
@@ -198,9 +198,9 @@ def test_a_time_limit_of_zero_is_over_at_once(engine: type[Theta], options: Thet
 
 
 @pytest.mark.parametrize(("engine", "options"), ENGINES)
-def test_costs_are_refused(engine: type[Theta], options: ThetaSettings) -> None:
+def test_non_uniform_costs_are_refused(engine: type[Theta], options: ThetaSettings) -> None:
     costs = CostSettings(clearance_weight=1.0)
     grid = grid_of(free_field(8, 8))
     problem = PlanningProblem(grid, start=(4, 4), goal=(5, 5), footprint=1.0, costs=costs)
-    with pytest.raises(ProblemError, match=rf"which '{engine.name}' needs.*Take 'astar'"):
+    with pytest.raises(ProblemError, match=rf"which '{engine.name}' needs.*Use 'astar'"):
         engine(Costmap.of(problem))

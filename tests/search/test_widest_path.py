@@ -1,4 +1,4 @@
-"""The widest way: none is wider, it is a short one, and its bottleneck is the place to widen."""
+"""The widest path: none is wider, it is short, and its bottleneck limits it."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ from planners.costmap.kernels.moves import COLS, ROWS
 from planners.no_route import widest_route
 from planners.search.kernels.lattice import squared_clearance
 from planners.search.kernels.widest_path import UNIT, WIDER, spread, steps_over
-from planners.search.widest_path import WidestRoute, widest_way
+from planners.search.widest_path import WidestRoute, widest_path
 
-CUT = 2e-9  # [cells]: by so much squares of 0.05 cells and more, cut to 2^-30, may be off
+CUT = 2e-9  # [cells] largest error of the root of squares of at least 0.05 cells, cut to 2^-30
 OFFSETS = st.sampled_from([0.0, 0.1, 0.25, 0.3, 0.5, 0.7, 0.75])
 
 
@@ -61,7 +61,7 @@ def lattice_oracle(blocked: Bools) -> Ints:
 
 
 class Graph:
-    """The half-cell lattice with two places beside it; every step as clear as shapely says."""
+    """The half-cell lattice with two places beside it; clearances of steps by shapely."""
 
     def __init__(self, blocked: Bools, a: tuple[float, float], b: tuple[float, float]) -> None:
         self.blocked, self.obstacles = blocked, union_of_squares(blocked)
@@ -82,7 +82,7 @@ class Graph:
         self.lengths = shapely.length(lines)
 
     def spans_free_cells(self, i: int, j: int) -> bool:
-        """Whether the cells between two places are free, and two by two at most, as for moves."""
+        """Whether the cells between two places are free and at most 2 x 2, as for moves."""
         if max(i, j) < len(self.places) - 2:
             return True
         (left, low), (right, high) = np.floor(np.sort(self.places[[i, j]], axis=0)).astype(int)
@@ -91,7 +91,7 @@ class Graph:
         return bool(inside and max(block.shape) <= 2 and not block.any())
 
     def widest(self) -> float:
-        """Return the clearance of the widest way: that of the maximum spanning tree."""
+        """Return the clearance of the widest path, from the maximum spanning tree."""
         use = self.clear > 0
         n = len(self.places)
         graph = coo_array((-self.clear[use], tuple(self.pairs[use].T)), shape=(n, n)).tocsr()
@@ -105,7 +105,7 @@ class Graph:
         return min(-float(tree[i, j] + tree[j, i]) for i, j in pairwise(way))
 
     def shortest(self, clearance: float) -> float:
-        """Return the length of the shortest way of a clearance."""
+        """Return the length of the shortest path of a clearance."""
         use = self.clear >= clearance - 1e-9
         n = len(self.places)
         edges = (self.lengths[use], tuple(self.pairs[use].T))
@@ -156,12 +156,12 @@ def two_places(draw: st.DrawFn, *, side: int) -> tuple[Bools, Any, Any]:
 
 @given(two_places(side=7))
 @settings(max_examples=80, deadline=None)
-def test_no_way_is_wider_and_of_those_as_wide_none_is_half_as_long(
+def test_no_path_is_wider_and_no_equally_wide_one_is_half_as_long(
     drawn_case: tuple[Bools, Any, Any],
 ) -> None:
     blocked, a, b = drawn_case
     graph = Graph(blocked, a, b)
-    route = widest_way(costmap_of_mask(blocked, a, b))
+    route = widest_path(costmap_of_mask(blocked, a, b))
     expected = graph.widest()
     if route is None:
         assert expected == 0.0
@@ -177,26 +177,26 @@ def test_no_way_is_wider_and_of_those_as_wide_none_is_half_as_long(
 
 @given(two_places(side=7))
 @settings(max_examples=60, deadline=None)
-def test_the_bottleneck_is_on_the_way_where_that_is_narrowest(
+def test_the_bottleneck_is_the_narrowest_point_of_the_path(
     drawn_case: tuple[Bools, Any, Any],
 ) -> None:
     blocked, a, b = drawn_case
     for place in ("start", "goal"):
-        route = widest_way(costmap_of_mask(blocked, a, b), seen_from=place)
+        route = widest_path(costmap_of_mask(blocked, a, b), seen_from=place)
         assume(route is not None)
         assert isinstance(route, WidestRoute)
         spot = shapely.Point(route.bottleneck)
         assert shapely.distance(spot, shapely.LineString(route.waypoints)) <= 1e-9
         clear = shapely.distance(spot, union_of_squares(blocked))
-        # A slanted piece at an end may be narrowest in its middle: half a cell is its extent.
+        # A slanted piece at an end may be narrowest in its middle: it extends over half a cell.
         assert route.clearance - 1e-9 <= clear <= route.clearance + math.hypot(0.5, 0.5)
 
 
 @given(two_places(side=9))
 @settings(max_examples=60, deadline=None)
-def test_back_is_as_wide_as_there(drawn_case: tuple[Bools, Any, Any]) -> None:
+def test_the_reverse_path_is_as_wide(drawn_case: tuple[Bools, Any, Any]) -> None:
     blocked, a, b = drawn_case
-    there, back = (widest_way(costmap_of_mask(blocked, *ends)) for ends in ((a, b), (b, a)))
+    there, back = (widest_path(costmap_of_mask(blocked, *ends)) for ends in ((a, b), (b, a)))
     assert (there is None) == (back is None)
     if there is not None and back is not None:
         assert there.width == pytest.approx(back.width, abs=2 * CUT)
@@ -204,7 +204,7 @@ def test_back_is_as_wide_as_there(drawn_case: tuple[Bools, Any, Any]) -> None:
 
 @given(masks(side=9), st.data())
 @settings(max_examples=60, deadline=None)
-def test_what_is_marked_as_wider_is_what_a_wider_way_leads_to(
+def test_marked_points_are_those_that_a_wider_path_reaches(
     blocked: Bools, data: st.DataObject
 ) -> None:
     squared = np.pad(squared_clearance(ringed(blocked)), 1)
@@ -257,7 +257,7 @@ def two_rooms(*gaps: tuple[int, int, int]) -> ConfidenceGrid:
     return grid_of(z)
 
 
-def test_the_bottleneck_is_the_gap_and_not_what_the_way_passes_as_near() -> None:
+def test_the_bottleneck_is_the_gap_and_not_another_point_of_equal_clearance() -> None:
     route = widest_route(problem(two_rooms((30, 40, 43)), (10.3, 9.2), (50.5, 9.5)))
     assert route.width == 3.0
     assert route.bottleneck == (31.0, 41.5)
@@ -270,14 +270,14 @@ def test_of_two_gaps_the_narrower_is_the_bottleneck() -> None:
         assert (route.width, route.bottleneck) == (3.0, (41.0, 51.5))
 
 
-def test_of_two_equal_gaps_the_bottleneck_is_that_on_the_side_it_is_seen_from() -> None:
+def test_of_two_equal_gaps_the_bottleneck_is_the_one_nearer_to_seen_from() -> None:
     costmap = Costmap.of(problem(two_rooms((20, 10, 13), (40, 50, 53)), (9.5, 30.5), (55.5, 30.5)))
-    seen = {place: widest_way(costmap, seen_from=place) for place in ("start", "goal")}
+    seen = {place: widest_path(costmap, seen_from=place) for place in ("start", "goal")}
     spots = {place: route.bottleneck for place, route in seen.items() if route is not None}
     assert spots == {"start": (21.0, 11.5), "goal": (41.0, 51.5)}
 
 
-def test_of_ways_that_are_as_wide_the_short_one_is_taken() -> None:
+def test_of_equally_wide_paths_the_shortest_is_returned() -> None:
     z = free_field(64, 64)
     z[:, 30:32] = BLOCKED
     z[10:13, 30:32] = z[50:53, 30:32] = FREE
@@ -295,7 +295,7 @@ def test_a_goal_beside_a_wall_is_the_bottleneck() -> None:
     assert (route.width, route.bottleneck) == (1.5, (29.25, 9.5))
 
 
-def test_from_a_place_to_itself_it_is_as_wide_as_there() -> None:
+def test_from_a_place_to_itself_the_width_is_that_of_the_place() -> None:
     route = widest_route(problem(two_rooms((30, 40, 43)), (12.3, 9.2), (12.3, 9.2)))
     assert route.waypoints.tolist() == [[12.3, 9.2], [12.3, 9.2]]
     assert route.clearance == pytest.approx(9.2)
@@ -308,7 +308,7 @@ def test_a_corner_that_two_blocked_cells_share_is_no_way() -> None:
     assert widest_route(problem(drawn(".. .#"), (0.5, 0.5), (1.5, 1.5))).width == 1.0
 
 
-def test_where_nothing_is_blocked_it_is_infinitely_wide_and_short() -> None:
+def test_without_blocked_cells_it_is_infinitely_wide_and_straight() -> None:
     asked = problem(grid_of(free_field(64, 64)), (3.5, 3.5), (40.5, 20.5), unknown="allow")
     route = widest_route(asked)
     assert route.width == route.clearance == math.inf
@@ -330,7 +330,7 @@ def test_the_start_is_cleared_as_for_the_footprint() -> None:
     assert route.width == pytest.approx(2 * (64 - 50.5))
 
 
-def test_places_that_are_none_are_refused() -> None:
+def test_invalid_places_are_refused() -> None:
     grid = two_rooms((30, 40, 43))
     with pytest.raises(NonFreeError, match=r"goal \(30.50, 9.50\): .* non-free space"):
         widest_route(problem(grid, (10.5, 9.5), (30.5, 9.5)))

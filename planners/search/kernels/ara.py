@@ -1,13 +1,13 @@
-"""ARA*: weighted A* whose next iteration, with a smaller weight, goes on where the last ended.
+"""ARA*: weighted A* whose next iteration, with a smaller weight, continues the previous one.
 
-A cell waits while its cost is lower than when it was last expanded, or if it never was. Cells
-that wait are in the heap, those already expanded in this iteration at its far end: they have to
-wait for the next. Entries whose cell has been expanded since are out of date, and ignored.
+A cell waits if its cost decreased after its last expansion, or if it was never expanded. Cells that
+wait are in the heap; those that were already expanded in this iteration are at its far end and wait
+for the next iteration. Entries whose cell was expanded meanwhile are outdated and are skipped.
 
 A cell's label is its cost so far and a mark: 32 * turn + 16 if it waits + the bit of the move that
-led here (or `ROOT`). Turns are counted on from query to query, so nothing needs clearing: `first`
-is the query's first turn, and marks below it are of earlier queries; `turn` is the iteration's,
-and what it expands gets it; what waits for it has an earlier one.
+led here (or `ROOT`). Turns increase from query to query, so labels need no reset. `first` is the
+query's first turn; lower marks are from earlier queries. `turn` is the iteration's: cells that it
+expands get this turn, and cells that wait for it have an earlier one.
 """
 
 from __future__ import annotations
@@ -19,19 +19,22 @@ from planners.costmap.kernels.moves import COLS, ROWS
 from planners.search.kernels.astar import (
     BEST,
     CAME,
+    EXHAUSTED,
     EXPANDED,
     FAR,
+    FOUND,
+    HEAP_FULL,
     MARK,
     ROOT,
     SIZE,
+    SLICE_DONE,
     TARGET,
     estimate,
     inflate,
 )
 from planners.search.kernels.heap import drop_top, push, replace_top, top_node
 
-WAITS = 16  # the part of a mark that says so
-SLICE_DONE, DONE, HEAP_FULL = range(3)  # what `advance` returns
+WAITS = 16  # part of a mark: the cell waits
 
 
 @njit(cache=True, nogil=True)
@@ -53,22 +56,24 @@ def advance(
 
     Parameters
     ----------
-    moves, costs, steps, width, targets, weight, heap, state, budget
-        As `planners.search.kernels.astar.advance` takes them; the weight is `UNIT` or more.
+    moves, costs, steps, width, targets, weight
+        As in `planners.search.kernels.astar.advance`; the weight is `UNIT` or more.
     labels : ndarray of int64, shape (cells, 2)
-        Per cell the cost so far and a mark, see above.
+        Cost so far and mark of every cell.
     first, turn : int
         Turns of the query and of this iteration, at least one apart.
+    heap, state, budget
+        As in `planners.search.kernels.astar.advance`.
 
     Returns
     -------
     int
-        `DONE` (no route costs less than `state[BEST]` / weight), `SLICE_DONE`, or `HEAP_FULL`
-        (call again with more room).
+        `FOUND` (no route costs less than `state[BEST]` / weight), `EXHAUSTED` (there is none),
+        `SLICE_DONE`, or `HEAP_FULL` (call again with more room).
     """
     fresh, now, end = MARK * first, MARK * turn, state[EXPANDED] + budget
     size, expanded, best = state[SIZE], state[EXPANDED], state[BEST]
-    status = DONE
+    status = EXHAUSTED
     while size > 0 and heap[0, 0] < best:
         if expanded >= end or size + 8 > len(heap):
             status = SLICE_DONE if expanded >= end else HEAP_FULL
@@ -95,7 +100,7 @@ def advance(
                 if mark >= fresh and reached >= labels[to, 0]:
                     continue
                 h = estimate(row + ROWS[k], col + COLS[k], targets)
-                if h >= best - reached:  # no better route leads here
+                if h >= best - reached:  # no better route leads through this cell
                     continue
                 labels[to, 0] = reached
                 if mark >= now:
@@ -109,6 +114,8 @@ def advance(
                 on_top = False
         if on_top:
             size = drop_top(heap, size)
+    if status == EXHAUSTED and best < FAR:
+        status = FOUND
     state[SIZE], state[EXPANDED], state[BEST] = size, expanded, best
     return status
 
@@ -117,14 +124,16 @@ def advance(
 def reopen(
     width: int, targets: Ints, weight: int, labels: Ints, turn: int, heap: Ints, state: Ints
 ) -> None:
-    """Key every cell that waits by a new weight, once, and drop what can't better the best route.
+    """Rebuild the heap with a new weight: each waiting cell once, unless it cannot improve `best`.
 
     Parameters
     ----------
-    width, targets, weight, labels, heap, state
-        As `advance` takes them.
+    width, targets, weight, labels
+        As in `advance`.
     turn : int
-        One after those in the labels, one before that of the next iteration.
+        One after the last turn in the labels, one before that of the next iteration.
+    heap, state
+        As in `advance`.
     """
     kept = 0
     for i in range(state[SIZE]):
@@ -137,16 +146,23 @@ def reopen(
         if h < state[BEST] - cost:
             labels[node, 1] = MARK * turn | WAITS | (mark & CAME)
             h = inflate(h, weight)
-            kept = push(heap, kept, cost + h, h, node)  # row i is read: the heap may grow over it
+            kept = push(heap, kept, cost + h, h, node)  # row i was read and may be overwritten
     state[SIZE] = kept
 
 
 @njit(cache=True, nogil=True)
 def least_total(width: int, targets: Ints, labels: Ints, heap: Ints, size: int) -> int:
-    """Return the smallest cost so far + estimate of what waits; `FAR` if nothing does.
+    """Return the smallest (cost so far + estimate) of all waiting cells; `FAR` if there is none.
 
-    A route better than the best leads through a cell that waits and whose cost is the least
-    there is: no route costs less than this, unless the best does.
+    A route better than the best one leads through a waiting cell whose cost so far is final. So
+    this is a lower bound on the cost of all routes, unless the best one costs less.
+
+    Parameters
+    ----------
+    width, targets, labels, heap
+        As in `advance`.
+    size : int
+        Number of heap entries.
     """
     least = FAR
     for i in range(size):
@@ -167,9 +183,14 @@ def settle(
     first: int,
     state: Ints,
 ) -> None:
-    """Take over the best of the routes that the marks describe now.
+    """Update the best route in `state` to the best one that the marks describe now.
 
-    Cells that were reached at lower costs after they were expanded have shortened it meanwhile.
+    It may have become shorter, as cells were reached at lower costs after their expansion.
+
+    Parameters
+    ----------
+    costs, steps, width, targets, labels, first, state
+        As in `advance`.
     """
     for k in range(len(targets)):
         target = targets[k, 0] * width + targets[k, 1]
@@ -189,7 +210,7 @@ def settle(
 
 @njit(cache=True, nogil=True)
 def _final_cost(row: int, col: int, targets: Ints) -> int:
-    """Return what the goal costs from a cell; `FAR` if it isn't joined to it."""
+    """Return the cost from a cell to the goal; `FAR` if the cell is not joined to the goal."""
     least = FAR
     for k in range(len(targets)):
         if row == targets[k, 0] and col == targets[k, 1]:
@@ -199,7 +220,7 @@ def _final_cost(row: int, col: int, targets: Ints) -> int:
 
 @njit(cache=True, nogil=True)
 def _put(heap: Ints, size: int, key: int, tie: int, node: int, on_top: bool) -> int:
-    """Insert one entry, in place of the smallest if that is done with; return the new size."""
+    """Insert one entry, in place of the smallest if it is `on_top`; return the new size."""
     if on_top:
         replace_top(heap, size, key, tie, node)
         return size

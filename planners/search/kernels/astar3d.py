@@ -1,17 +1,18 @@
-"""A* over voxels, in slices, so that Python can watch the clock in between.
+"""A* over voxels, in slices, so that Python can check the clock in between.
 
 Costs are the integers of `planners.search.kernels.astar`; a move through a voxel's corner costs
-`SPACE`. Moves are found as the search goes: a bit per voxel of the 3 x 3 x 3 around a node says
-where the robot may stand. Bits are numbered x first, then y, then z; bit 13 is the node itself, bit
-k the voxel that move k leads to. A move needs every voxel of the box that it spans.
+`SPACE`. Allowed moves are derived during the search from a mask of the 3 x 3 x 3 voxels around a
+node, which holds a bit for each traversable one. Bits are numbered x first, then y, then z; bit 13
+is the node itself, bit k the voxel that move k leads to. A move is allowed if every voxel of the
+box that it spans is traversable.
 
-Half of all moves need no look: arrived at n from p by move d, move e to m is left out if the voxels
-around n offer a way from p to m that is shorter, or as long with a shorter last move (p to m at
-once, or the two moves of the shortest way, the longer one first). No optimum is lost by that. Let
-all nodes nearer than m be reached at their best, and take of the last moves of all shortest ways to
-m one of the shortest: into m from n. Were it left out, the other way would be as short, and reach
-m by a still shorter last move, from a node nearer than m. The costs of ties are integers, so that
-"as long" means what it says.
+About half of all moves are pruned. If move d led from p to n, move e from n to m is pruned if the
+voxels around n allow a path from p to m that is shorter, or as long with a shorter last move (from
+p to m directly, or by the two moves of the shortest path, the longer one first). Pruning preserves
+optimality. Assume that all nodes nearer than m are reached at their least cost, and among the last
+moves of all shortest paths to m, consider one of least length: from n into m. If it were pruned,
+the other path would be as short and would reach m by a shorter last move, which contradicts the
+choice. Costs are integers, so "as long" is exact.
 """
 
 from __future__ import annotations
@@ -23,13 +24,22 @@ from numba import njit
 
 from groundmap.arrays import Bools, Ints, Ints32
 from planners.costmap.kernels.moves import DIAGONAL, ONE
-from planners.search.kernels.astar import EXHAUSTED, FAR, FOUND, HEAP_FULL, SLICE_DONE
+from planners.search.kernels.astar import (
+    BEST,
+    EXHAUSTED,
+    EXPANDED,
+    FAR,
+    FOUND,
+    HEAP_FULL,
+    SIZE,
+    SLICE_DONE,
+    TARGET,
+)
 from planners.search.kernels.heap import drop_top, push, replace_top, top_node
 
 SPACE = 7439101574  # round(sqrt(3) * ONE)
-MARK, CLOSED, CAME, ROOT = 64, 32, 31, 13  # parts of a mark; ROOT: no move led here
-EVERYWHERE, NEVER = 2**27 - 1, 2**27  # masks: the robot may stand all around; not a voxel
-SIZE, BEST, TARGET, EXPANDED = range(4)  # entries of `state`
+MARK, CLOSED, CAME, ROOT = 64, 32, 31, 13  # parts of a mark; ROOT: a source, which no move led to
+EVERYWHERE, NEVER = 2**27 - 1, 2**27  # masks: all voxels are traversable; no voxel
 
 #: Layer, row and column that each move adds; shape (27, 3).
 STEPS = np.array(list(itertools.product((-1, 0, 1), repeat=3)), dtype=np.int64)
@@ -45,17 +55,17 @@ def _box(first: Ints, last: Ints) -> int:
 
 
 def _detour(arrival: int, move: int) -> int:
-    """Return what must be free for the other way, that makes `move` after `arrival` needless."""
+    """Return the mask of voxels that must be traversable to prune `move` after `arrival`."""
     before, after = -STEPS[arrival], STEPS[move]
     whole = after - before
     if ROOT in (arrival, move):
         return NEVER
     if np.abs(whole).max() < 2:
         return _box(before, after)
-    # Along an axis of 2 both moves go; one of 1 is gone along at once.
+    # Both moves go along an axis of 2; the first move goes along an axis of 1.
     between = before + np.sign(whole)
     if (between == 0).all():
-        return NEVER  # `move` itself is the shortest way on
+        return NEVER  # `move` itself is on the shortest path
     return _box(before, between) | _box(between, after)
 
 
@@ -65,25 +75,32 @@ DETOURS = np.array([[_detour(d, e) for e in range(27)] for d in range(27)], dtyp
 
 @njit(cache=True, nogil=True)
 def estimate(layer: int, row: int, col: int, targets: Ints) -> int:
-    """Return the smallest (26-connected distance to a target + its final cost): consistent."""
+    """Return the smallest (26-connected distance to a target + its final cost); consistent.
+
+    Parameters
+    ----------
+    layer, row, col : int
+    targets : ndarray of int64, shape (n, 4)
+        Layer, row, column and final cost of the voxels that are joined to the goal.
+    """
     least = FAR
     for k in range(len(targets)):
         x, y, z = abs(col - targets[k, 2]), abs(row - targets[k, 1]), abs(layer - targets[k, 0])
         low, high = min(x, y, z), max(x, y, z)
         middle = x + y + z - low - high
-        way = (high - middle) * ONE + (middle - low) * DIAGONAL + low * SPACE
-        least = min(least, way + targets[k, 3])
+        length = (high - middle) * ONE + (middle - low) * DIAGONAL + low * SPACE
+        least = min(least, length + targets[k, 3])
     return least
 
 
 @njit(cache=True, nogil=True)
 def plates_of(traversable: Bools) -> Ints32:
-    """Return where the robot may stand among the 3 x 3 voxels around each one, in its own layer.
+    """Return which of the 3 x 3 voxels around each one, in its own layer, are traversable.
 
     Parameters
     ----------
     traversable : ndarray of bool, shape (layers, rows, cols)
-        Its borders must be false.
+        Its borders must be False.
 
     Returns
     -------
@@ -97,10 +114,38 @@ def plates_of(traversable: Bools) -> Ints32:
             for col in range(1, cols - 1):
                 if traversable[layer, row, col]:
                     for k in range(9):
-                        # Seen from its neighbour, the voxel is on the opposite side.
+                        # From the neighbour, the voxel is in the opposite direction.
                         i, j = k // 3 - 1, k % 3 - 1
                         plates[layer, row - i, col - j] |= 1 << k
     return plates.ravel()
+
+
+@njit(cache=True, nogil=True)
+def seed(
+    sources: Ints, targets: Ints, width: int, slab: int, mark: int, labels: Ints, heap: Ints
+) -> int:
+    """Put the sources on an empty heap and return its size.
+
+    Parameters
+    ----------
+    sources, targets : ndarray of int64, shape (n, 4)
+        Layer, row, column and cost of the voxels that are joined to the start, and to the goal.
+    width, slab : int
+        Voxels in a row, and in a layer.
+    mark : int
+        Mark of the sources.
+    labels : ndarray of int64, shape (voxels, 2)
+        Cost so far and mark of every voxel.
+    heap : ndarray of int64, shape (room, 2)
+    """
+    size = 0
+    for i in range(len(sources)):
+        layer, row, col, cost = sources[i, 0], sources[i, 1], sources[i, 2], sources[i, 3]
+        node = layer * slab + row * width + col
+        labels[node, 0], labels[node, 1] = cost, mark
+        h = estimate(layer, row, col, targets)
+        size = push(heap, size, cost + h, h, node)
+    return size
 
 
 @njit(cache=True, nogil=True)
@@ -127,13 +172,14 @@ def advance(
         Layer, row, column and final cost of the voxels that are joined to the goal.
     labels : ndarray of int64, shape (voxels, 2)
         Per voxel the cost so far and a mark: 64 * query + 32 if closed + the move that led here
-        (or `ROOT`). Marks below 64 * query are of earlier queries.
+        (or `ROOT`). Marks below 64 * query are from earlier queries.
     query : int
         Number of this query, from 1.
     heap : ndarray of int64, shape (room, 2)
-        Keyed by f = g + h; ties go to the smaller h.
+        Keyed by f = g + h; ties are broken by the smaller h.
     state : ndarray of int64, shape (4,)
         Heap size, best total cost, its target, number of expanded nodes.
+    budget : int
 
     Returns
     -------
@@ -143,12 +189,12 @@ def advance(
     fresh, end = MARK * query, state[EXPANDED] + budget
     size, expanded, best = state[SIZE], state[EXPANDED], state[BEST]
     status = EXHAUSTED
-    while size > 0 and heap[0, 0] < best:  # nothing else that waits can better `best`
+    while size > 0 and heap[0, 0] < best:  # no other open node can improve `best`
         if expanded >= end or size + 26 > len(heap):
             status = SLICE_DONE if expanded >= end else HEAP_FULL
             break
         node = top_node(heap)
-        if labels[node, 1] & CLOSED:  # it came out before, at a lower cost
+        if labels[node, 1] & CLOSED:  # expanded before, at a lower cost
             size = drop_top(heap, size)
             continue
         arrival = labels[node, 1] & CAME
@@ -166,7 +212,7 @@ def advance(
         around = plates[node - slab] | (plates[node] << 9) | (plates[node + slab] << 18)
         on_top = True
         for k in range(27):
-            if k == ROOT or not _is_of_use(arrival, k, around):
+            if k == ROOT or not _is_useful(arrival, k, around):
                 continue
             to = node + STEPS[k, 0] * slab + STEPS[k, 1] * width + STEPS[k, 2]
             reached = cost + COSTS[k]
@@ -187,8 +233,8 @@ def advance(
 
 
 @njit(cache=True, nogil=True)
-def _is_of_use(arrival: int, move: int, around: int) -> bool:
-    """Whether a move is allowed, and no way around its node makes it needless."""
+def _is_useful(arrival: int, move: int, around: int) -> bool:
+    """Whether a move is allowed and not pruned."""
     if (around & NEEDS[move]) != NEEDS[move]:
         return False
     detour = DETOURS[arrival, move]
@@ -197,7 +243,14 @@ def _is_of_use(arrival: int, move: int, around: int) -> bool:
 
 @njit(cache=True, nogil=True)
 def trace(labels: Ints, width: int, slab: int, node: int) -> Ints:
-    """Return the voxels where the path to `node` begins, turns and ends, last first."""
+    """Return the voxels where the path to a node begins, turns and ends, last first.
+
+    Parameters
+    ----------
+    labels : ndarray of int64, shape (voxels, 2)
+        As in `advance`.
+    width, slab, node : int
+    """
     turns = [node]
     heading = labels[node, 1] & CAME
     while heading != ROOT:

@@ -1,4 +1,4 @@
-"""How long this process has compiled kernels, or loaded them from numba's cache."""
+"""The time that this process spent on compiling kernels or loading them from numba's cache."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numba.core import event
 
 
 class _Stopwatch(event.Listener):
-    """Sums up the time in which any thread compiles."""
+    """Measures the total time during which any thread compiles."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -24,7 +24,7 @@ class _Stopwatch(event.Listener):
             return self._total + running
 
     def on_start(self, event: Any) -> None:
-        """Start, unless a compilation is under way: a kernel compiles those that it calls."""
+        """Start unless already running: compiling a kernel compiles the kernels that it calls."""
         with self._lock:
             if self._active == 0:
                 self._since = time.perf_counter()
@@ -39,12 +39,12 @@ class _Stopwatch(event.Listener):
 
 
 _stopwatch = _Stopwatch()
-_register: Any = event.register  # which is not annotated
+_register: Any = event.register  # it has no annotations
 _register("numba:compiler_lock", _stopwatch)
 
 
 def compiled_for() -> float:
-    """Return for how long kernels have been compiled or loaded in this process [s].
+    """Return the time spent on compiling or loading kernels in this process [s].
 
     Examples
     --------

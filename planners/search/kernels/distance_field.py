@@ -1,12 +1,12 @@
 """Dijkstra's search over all cells, with buckets instead of a heap.
 
-Every move costs at least `ONE`, and a bucket holds the cells whose cost so far is the same in whole
-`ONE`s. Cells of one bucket then can't better each other, so they come out in any order, and each
-cell is settled once: time is linear in the number of cells. As a cost so far is never further ahead
-than the dearest move, the buckets are a ring. A bucket is a doubly linked list; a cell whose cost
-falls moves to another.
+Every move costs at least `ONE`, and a bucket holds the cells of equal cost so far in whole `ONE`s.
+Cells of one bucket cannot improve each other, so their order is arbitrary and each cell is settled
+once: time is linear in the number of cells. Costs so far lie within the cost of the most expensive
+move of the current bucket, so the buckets form a ring. A bucket is a doubly linked list; a cell
+whose cost decreases moves to another bucket.
 
-The small functions are inlined: to hand over half a dozen arrays takes longer than they do.
+The small functions are inlined: passing half a dozen arrays takes longer than their work.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from planners.costmap.kernels.moves import COLS, ROWS
 from planners.search.kernels.astar import FAR
 
 ONE_BITS = 32  # ONE is 2**32
-NOBODY = -1
+NO_CELL = -1
 BUCKET, WAITING, SETTLED = range(3)  # entries of `state`
 NEXT, PREVIOUS = range(2)  # columns of `chain`
 
@@ -32,10 +32,12 @@ def seed(
 
     Parameters
     ----------
-    width, labels, chain, heads, state
-        As in `settle`.
+    width : int
+        Cells in a row.
     sources : ndarray of int64, shape (n, 3)
-        Row, column and cost; each cell once.
+        Row, column and cost; each cell at most once.
+    labels, chain, heads, state
+        As in `settle`.
     """
     for k in range(len(sources)):
         node = sources[k, 0] * width + sources[k, 1]
@@ -54,32 +56,33 @@ def settle(
     state: Ints,
     budget: int,
 ) -> bool:
-    """Settle up to `budget` cells, and return whether that was all.
+    """Settle up to `budget` cells, and return whether all are settled.
 
     Parameters
     ----------
     moves : ndarray of uint8, shape (cells,)
         Allowed moves of every cell, as in `planners.search.kernels.astar`.
     costs : ndarray of uint8, shape (cells,)
-        What each cell costs extra.
+        Costs of cells.
     steps : ndarray of int64, shape (2, 505)
         Cost of orthogonal and diagonal moves by the sum of the two cells' costs, `ONE` at least.
     width : int
         Cells in a row.
     labels : ndarray of int64, shape (cells,)
-        Cost so far; `FAR` to begin with.
+        Cost so far; initially `FAR`.
     chain : ndarray of int32, shape (cells, 2)
         Neighbours in the bucket's list.
     heads : ndarray of int32, shape (buckets,)
-        First cell of each bucket; `NOBODY` to begin with. One more bucket than the dearest move
-        or source costs in whole `ONE`s, and one for the rest.
+        First cell of each bucket; initially `NO_CELL`. The number of buckets is the cost of the
+        most expensive move or source in whole `ONE`s, rounded down, plus 2.
     state : ndarray of int64, shape (3,)
-        Number of the bucket in hand, cells that wait, cells settled; zeros to begin with.
+        Number of the current bucket, of waiting cells and of settled cells; initially zeros.
+    budget : int
     """
     end = state[SETTLED] + budget
     while state[WAITING] > 0 and state[SETTLED] < end:
         node = heads[state[BUCKET] % len(heads)]
-        if node == NOBODY:
+        if node == NO_CELL:
             state[BUCKET] += 1
             continue
         _leave(node, labels, chain, heads, state)
@@ -96,14 +99,14 @@ def settle(
 
 @njit(cache=True, nogil=True, inline="always")
 def _reach(node: int, cost: int, labels: Ints, chain: Ints32, heads: Ints32, state: Ints) -> None:
-    """Let a cell cost less than it did so far."""
+    """Set a lower cost so far of a cell, and put it into its bucket."""
     if labels[node] < FAR:
         _leave(node, labels, chain, heads, state)
     labels[node] = cost
     bucket = (cost >> ONE_BITS) % len(heads)
     first = heads[bucket]
-    chain[node, NEXT], chain[node, PREVIOUS] = first, NOBODY
-    if first != NOBODY:
+    chain[node, NEXT], chain[node, PREVIOUS] = first, NO_CELL
+    if first != NO_CELL:
         chain[first, PREVIOUS] = node
     heads[bucket] = node
     state[WAITING] += 1
@@ -111,11 +114,11 @@ def _reach(node: int, cost: int, labels: Ints, chain: Ints32, heads: Ints32, sta
 
 @njit(cache=True, nogil=True, inline="always")
 def _leave(node: int, labels: Ints, chain: Ints32, heads: Ints32, state: Ints) -> None:
-    """Take a cell out of its bucket."""
+    """Remove a cell from its bucket."""
     after, before = chain[node, NEXT], chain[node, PREVIOUS]
-    if after != NOBODY:
+    if after != NO_CELL:
         chain[after, PREVIOUS] = before
-    if before != NOBODY:
+    if before != NO_CELL:
         chain[before, NEXT] = after
     else:
         heads[(labels[node] >> ONE_BITS) % len(heads)] = after

@@ -1,22 +1,22 @@
 """D* Lite (Koenig & Likhachev 2002, its optimised version), from the goal to the robot's start.
 
-Every cell has two costs to the goal: `g`, what the search last settled on, and `rhs`, what its
-neighbours' `g` make of it. A cell where they differ waits in the heap: it is *lowered* (g > rhs)
-or *raised* (g < rhs; a way it relied on is gone). Where a map changes, `touch` computes `rhs`
-anew, and only cells that this concerns are expanded again.
+Every cell has two costs to the goal: `g`, the result of its last expansion, and `rhs`, which
+follows from the `g` of its neighbours. A cell where they differ waits in the heap, to be *lowered*
+(g > rhs) or *raised* (g < rhs; a path through a neighbour is lost). Where a map changes, `touch`
+recomputes `rhs`, and only affected cells are expanded again.
 
-Two things differ from the paper, and both keep its result:
+The search differs from the paper in two points, which preserve its result:
 
-* Among equal f, cells to be raised come first, then those nearer to the start; the paper takes
-  the smaller cost, and so expands all cells of the optimal f before it may end. Lowered cells may
-  come in any order once no cell of that f waits to be raised: the neighbour that such a cell relies
-  on has no larger f, so if it waited too, it would have come out before. For the same reason the
-  search may end when no f that waits is below the best cost, and none that equals it is a raise.
-* Nothing is removed from the heap. Every waiting cell has an entry whose f is at most its own (the
-  heuristic's shift `km` only ever makes old entries too small, as in the paper). What comes out is
-  dropped if it is out of date, and put back if its f is too small.
+* Among equal f, cells to be raised come first, then those nearer to the start. The paper orders
+  them by cost, and so expands all cells of the optimal f before it ends. Cells to be lowered may
+  come in any order once no cell of that f waits to be raised: the neighbour that determines such a
+  cell's `rhs` has no larger f, so if it waited too, it would have come first. For the same reason,
+  the search ends when no waiting f is below the best cost, and none that equals it is a raise.
+* No entry is removed from within the heap. Every waiting cell has an entry whose f is at most its
+  own (the heuristic's shift `km` only makes old entries too small, as in the paper). An entry at
+  the top is dropped if it is outdated, and inserted again if its f is too small.
 
-The small functions are inlined: to hand over half a dozen arrays takes longer than they do.
+The small functions are inlined: passing half a dozen arrays takes longer than their work.
 """
 
 from __future__ import annotations
@@ -26,11 +26,20 @@ from numba import njit
 
 from groundmap.arrays import Bytes, Ints
 from planners.costmap.kernels.moves import COLS, ROWS
-from planners.search.kernels.astar import FAR, estimate
+from planners.search.kernels.astar import (
+    BEST,
+    EXHAUSTED,
+    EXPANDED,
+    FAR,
+    FOUND,
+    HEAP_FULL,
+    SIZE,
+    SLICE_DONE,
+    estimate,
+)
 from planners.search.kernels.heap import TIE_SHIFT, drop_top, push, replace_top, top_node
 
-SLICE_DONE, DONE, HEAP_FULL = range(3)  # what `advance` returns
-SIZE, BEST, SHIFT, EXPANDED = range(4)  # entries of `state`; SHIFT is the paper's km
+SHIFT = 2  # entry of `state` in place of A*'s target: the paper's km
 G, RHS = range(2)  # columns of `labels`
 LOWER = 1 << TIE_SHIFT  # ties of cells to be lowered begin here; those to be raised have 0
 MOST_TIE = (1 << 52) - 1 - LOWER
@@ -56,7 +65,7 @@ def advance(
     moves : ndarray of uint8, shape (cells,)
         Allowed moves of every cell, as in `planners.search.kernels.astar`.
     costs : ndarray of uint8, shape (cells,)
-        What each cell costs extra.
+        Costs of cells.
     steps : ndarray of int64, shape (2, 505)
         Cost of orthogonal and diagonal moves by the sum of the two cells' costs.
     width : int
@@ -64,19 +73,20 @@ def advance(
     sources, targets : ndarray of int64, shape (n, 3)
         Row, column and cost of the cells that are joined to the start, and to the goal.
     labels : ndarray of int64, shape (cells, 2)
-        `G` and `RHS` of every cell; `FAR` for infinite.
+        `G` and `RHS` of every cell; `FAR` for infinity.
     heap : ndarray of int64, shape (room, 2)
     state : ndarray of int64, shape (4,)
-        Heap size, cost of the best route so far, shift of the heuristic, expanded nodes.
+        Heap size, cost of the best route so far, shift of the heuristic, number of expanded nodes.
+    budget : int
 
     Returns
     -------
     int
-        `DONE` (the best cost is final, `FAR` if there is no route), `SLICE_DONE`, or `HEAP_FULL`
-        (call again with more room).
+        `FOUND` (the best cost is final), `EXHAUSTED` (there is no route), `SLICE_DONE`, or
+        `HEAP_FULL` (call again with more room).
     """
     best = best_of(sources, labels, width)
-    status, taken = DONE, 0
+    status, taken = EXHAUSTED, 0
     while _goes_on(heap, state, best):
         if taken >= budget or state[SIZE] + 9 > len(heap):
             status = SLICE_DONE if taken >= budget else HEAP_FULL
@@ -101,7 +111,7 @@ def advance(
             if _joining_cost(sources, node, width) < FAR:
                 best = best_of(sources, labels, width)
     state[BEST] = best
-    return status
+    return FOUND if status == EXHAUSTED and best < FAR else status
 
 
 @njit(cache=True, nogil=True)
@@ -117,12 +127,12 @@ def touch(
     heap: Ints,
     state: Ints,
 ) -> None:
-    """Compute `rhs` of cells anew whose moves, costs or final cost changed.
+    """Recompute `rhs` of cells whose moves, costs or final cost changed.
 
     Parameters
     ----------
     nodes : ndarray of int64, shape (n,)
-        The heap must have room for as many entries.
+        Indices of cells. The heap must have room for as many entries.
     moves, costs, steps, width, sources, targets, labels, heap, state
         As in `advance`.
     """
@@ -133,7 +143,13 @@ def touch(
 
 @njit(cache=True, nogil=True)
 def compact(width: int, sources: Ints, labels: Ints, heap: Ints, state: Ints) -> None:
-    """Drop the heap's entries that are out of date."""
+    """Drop the heap's outdated entries.
+
+    Parameters
+    ----------
+    width, sources, labels, heap, state
+        As in `advance`.
+    """
     size = 0
     for i in range(state[SIZE]):
         node = heap[i, 1] & 0xFFFFFFFF
@@ -146,7 +162,13 @@ def compact(width: int, sources: Ints, labels: Ints, heap: Ints, state: Ints) ->
 
 @njit(cache=True, nogil=True)
 def best_of(sources: Ints, labels: Ints, width: int) -> int:
-    """Return the least cost from the start over its sources to the goal; `FAR` for none."""
+    """Return the least cost from the start to the goal; `FAR` if there is no route.
+
+    Parameters
+    ----------
+    sources, labels, width
+        As in `advance`.
+    """
     best = FAR
     for k in range(len(sources)):
         g = labels[sources[k, 0] * width + sources[k, 1], G]
@@ -161,7 +183,12 @@ def trace(
 ) -> Ints:
     """Return the cells where the best path begins, turns and ends, after a search that found one.
 
-    Of neighbours that are equally good the one straight ahead is taken.
+    Among equally good neighbours, the one straight ahead is chosen.
+
+    Parameters
+    ----------
+    moves, costs, steps, width, sources, targets, labels
+        As in `advance`.
     """
     best, node = best_of(sources, labels, width), 0
     for k in range(len(sources)):
@@ -190,7 +217,7 @@ def trace(
 
 @njit(cache=True, nogil=True, inline="always")
 def _goes_on(heap: Ints, state: Ints, best: int) -> bool:
-    """Whether something waits that can better `best`, or take it back."""
+    """Whether a waiting entry can lower `best` or raise it."""
     if state[SIZE] == 0:
         return False
     if best == FAR:
@@ -201,7 +228,7 @@ def _goes_on(heap: Ints, state: Ints, best: int) -> bool:
 
 @njit(cache=True, nogil=True, inline="always")
 def _key(node: int, width: int, g: int, rhs: int, sources: Ints, shift: int) -> tuple[int, int]:
-    """Return f and tie of a cell; of no use if g and rhs are equal."""
+    """Return f and tie of a cell; both 0 if g and rhs are equal."""
     if g == rhs:
         return 0, 0
     row = node // width
@@ -241,7 +268,7 @@ def _rhs(
 def _set_rhs(
     width: int, sources: Ints, labels: Ints, heap: Ints, state: Ints, node: int, rhs: int
 ) -> None:
-    """Set a cell's `rhs`, and push the cell if it waits and no entry of an f as small exists."""
+    """Set a cell's `rhs`, and push the cell if it waits and has no entry of an f as small."""
     g, before = labels[node, G], labels[node, RHS]
     labels[node, RHS] = rhs
     if g != rhs and (g == before or min(g, rhs) < min(g, before)):
@@ -261,7 +288,7 @@ def _lower(
     state: Ints,
     node: int,
 ) -> None:
-    """Let the neighbours know that `g` fell."""
+    """Update the neighbours after a decrease of `g`."""
     g, allowed = labels[node, G], moves[node]
     for k in range(8):
         if (allowed >> k) & 1:
@@ -283,9 +310,9 @@ def _raise(
     heap: Ints,
     state: Ints,
     node: int,
-    fallen: int,
+    lost: int,
 ) -> None:
-    """Let the neighbours that relied on `g`, which was `fallen`, look for another way."""
+    """Recompute `rhs` of the neighbours whose `rhs` came from the former `g`, which is `lost`."""
     if labels[node, RHS] < FAR:
         f, tie = _key(node, width, FAR, labels[node, RHS], sources, state[SHIFT])
         state[SIZE] = push(heap, state[SIZE], f, tie, node)
@@ -293,6 +320,6 @@ def _raise(
     for k in range(8):
         if (allowed >> k) & 1:
             to = node + ROWS[k] * width + COLS[k]
-            if labels[to, RHS] == fallen + _cost(costs, steps, node, to, k):
+            if labels[to, RHS] == lost + _cost(costs, steps, node, to, k):
                 rhs = _rhs(moves, costs, steps, width, targets, labels, to)
                 _set_rhs(width, sources, labels, heap, state, to, rhs)

@@ -1,4 +1,4 @@
-"""Which cells can be reached over the allowed moves."""
+"""The cells that allowed moves reach."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from planners.costmap.kernels.moves import COLS, ROWS
 
 @njit(cache=True, nogil=True)
 def flood(moves: Bytes, width: int, sources: Ints) -> Bools:
-    """Return which cells can be reached from any of `sources`, these included.
+    """Return which cells can be reached from any of the sources, including these.
 
     Parameters
     ----------
@@ -20,6 +20,7 @@ def flood(moves: Bytes, width: int, sources: Ints) -> Bools:
     width : int
         Cells in a row.
     sources : ndarray of int64, shape (n,)
+        Indices of cells.
     """
     reached = np.zeros(len(moves), dtype=np.bool_)
     stack = np.empty(len(moves), dtype=np.int64)

@@ -1,7 +1,7 @@
-"""A 4-ary min-heap in one flat array whose rows are a key, and a tie and a node in one integer.
+"""A 4-ary min-heap in one array, whose rows hold a key, and a tie and a node in one integer.
 
-Four children per node: half the depth of a binary heap, and the 64 bytes of four siblings share
-a cache line or two. Entries of equal keys come out by the smaller tie.
+With four children per entry, it is half as deep as a binary heap, and the 64 bytes of four siblings
+share one or two cache lines. Among equal keys, the entry of the smallest tie comes first.
 """
 
 from __future__ import annotations
@@ -10,12 +10,19 @@ from numba import njit
 
 from groundmap.arrays import Ints
 
-TIE_SHIFT = 21  # of the tie's 52 bits, the upper 31 are kept beside the node's 32
+TIE_SHIFT = 21  # of the tie's 52 bits, the upper 31 are stored beside the node's 32
 
 
 @njit(cache=True, nogil=True)
 def push(heap: Ints, size: int, key: int, tie: int, node: int) -> int:
-    """Insert one entry and return the new size; the heap, of shape (n, 2), must have room."""
+    """Insert one entry and return the new size.
+
+    Parameters
+    ----------
+    heap : ndarray of int64, shape (room, 2)
+        It must have room for one more entry.
+    size, key, tie, node : int
+    """
     second = _pack(tie, node)
     i = size
     while i > 0:
@@ -36,7 +43,13 @@ def top_node(heap: Ints) -> int:
 
 @njit(cache=True, nogil=True)
 def drop_top(heap: Ints, size: int) -> int:
-    """Remove the smallest entry, row 0, and return the new size."""
+    """Remove the smallest entry, row 0, and return the new size.
+
+    Parameters
+    ----------
+    heap : ndarray of int64, shape (room, 2)
+    size : int
+    """
     size -= 1
     _sink(heap, size, heap[size, 0], heap[size, 1])
     return size
@@ -44,7 +57,13 @@ def drop_top(heap: Ints, size: int) -> int:
 
 @njit(cache=True, nogil=True)
 def replace_top(heap: Ints, size: int, key: int, tie: int, node: int) -> None:
-    """Put one entry in the place of the smallest: cheaper than to drop one and push one."""
+    """Replace the smallest entry, which is cheaper than a removal and an insertion.
+
+    Parameters
+    ----------
+    heap : ndarray of int64, shape (room, 2)
+    size, key, tie, node : int
+    """
     _sink(heap, size, key, _pack(tie, node))
 
 
@@ -55,7 +74,7 @@ def _pack(tie: int, node: int) -> int:
 
 @njit(cache=True, nogil=True)
 def _sink(heap: Ints, size: int, key: int, second: int) -> None:
-    """Write an entry over row 0 and let it sink to its place."""
+    """Write an entry over row 0 and sift it down."""
     i = 0
     while True:
         child = 4 * i + 1

@@ -1,9 +1,9 @@
-"""Hybrid A*: a search over poses, in slices, so that Python can watch the clock in between.
+"""Hybrid A*: a search over poses, in slices, so that Python can check the clock in between.
 
-A node is a pose that motions of constant curvature lead to exactly; of all poses in one cell and
-one bin of headings, only the cheapest is kept. Now and then the shortest curve from a node to the
-goal, heedless of obstacles, is tried: if it is clear, it is a whole route. (Dolgov, Thrun,
-Montemerlo, Diebel 2010.) Positions and lengths are in cells, costs too.
+A node is the exact end pose of motions of constant curvature; of all poses in one cell and one bin
+of headings, only the cheapest is kept. At some nodes, the cheapest curve to the goal without regard
+to obstacles is checked; if it is clear, it completes a route. (Dolgov, Thrun, Montemerlo, Diebel
+2010.) Positions, lengths and costs are in cells.
 """
 
 from __future__ import annotations
@@ -18,7 +18,17 @@ from groundmap.arrays import Bools, Floats, Ints, Ints32
 from planners.costmap.kernels.moves import ONE
 from planners.geometry.kernels.curves import SEGMENTS, along, wrap
 from planners.geometry.kernels.swept_footprint import Ground, Shape, cuts, motion_clear
-from planners.search.kernels.astar import FAR
+from planners.search.kernels.astar import (
+    BEST,
+    EXHAUSTED,
+    EXPANDED,
+    FAR,
+    FOUND,
+    HEAP_FULL,
+    SIZE,
+    SLICE_DONE,
+    TARGET,
+)
 from planners.search.kernels.heap import drop_top, push, top_node
 from planners.search.kernels.hybrid_field import SIDE, UNREACHED, Field, distance_of
 from planners.search.kernels.hybrid_motion import (
@@ -35,28 +45,26 @@ from planners.search.kernels.hybrid_motion import (
     steering,
 )
 
-SLICE_DONE, FOUND, EXHAUSTED, FULL = range(4)  # what `advance` returns
-SIZE, COUNT, EXPANDED, WAIT, BEST, LAST = range(6)  # entries of `state`
-STATE_SIZE = 6
-MOST = 2.0**30  # [cells] of a cost as a key
-HASH = 0x9E3779B97F4A7C15 - 2**64  # odd; the golden ratio spreads keys that are close together
+COUNT, WAIT, STATE_SIZE = 4, 5, 6  # entries of `state` after those of A*, and its length
+MOST = 2.0**30  # [cells] largest cost as a key
+HASH = 0x9E3779B97F4A7C15 - 2**64  # odd, from the golden ratio, which spreads neighbouring keys
 
 
 class Nodes(NamedTuple):
-    """The poses reached so far, and a table of them by cell and bin (linear probing)."""
+    """The poses reached so far, and a hash table of them by cell and bin (linear probing)."""
 
     poses: Floats  #: shape (room, 3) [cells; rad]
-    costs: Floats  #: shape (room,); so far
-    guesses: Floats  #: shape (room,); of the cost still to come
+    costs: Floats  #: shape (room,) [cells]; costs so far
+    guesses: Floats  #: shape (room,) [cells]; estimates of the remaining costs
     keys: Ints  #: shape (room,); cell * bins + bin
     parents: Ints32  #: shape (room,)
-    motions: Ints32  #: shape (room,); that led here, or `ROOT`
+    motions: Ints32  #: shape (room,); the motion that led here, or `ROOT`
     closed: Bools  #: shape (room,)
-    table: Ints32  #: shape (a power of two,); nodes, or -1
+    table: Ints32  #: shape (power of two,); nodes, or -1
 
 
 class Shot(NamedTuple):
-    """The curve that ends the best route so far; lengths in turning radii."""
+    """The last curve of the best route so far; lengths in turning radii."""
 
     lengths: Floats  #: shape (5,)
     turns: Ints  #: shape (5,)
@@ -64,7 +72,7 @@ class Shot(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def key_of(cost: float) -> int:
-    """Return a cost [cells] as an integer for the heap; all above `MOST` are alike."""
+    """Return a cost [cells] as an integer for the heap, at most that of `MOST`."""
     return round(min(cost, MOST) * ONE)
 
 
@@ -78,15 +86,28 @@ def begin(
     nodes: Nodes,
     heap: Ints,
 ) -> Ints:
-    """Put the start on an empty heap and return the state; nothing waits if it is fenced in.
+    """Put the start on an empty heap and return the state.
+
+    The heap stays empty if the distance field does not reach the start.
 
     Parameters
     ----------
+    ground : Ground
+    field : Field
+    drive : Drive
     start, goal : ndarray, shape (3,) [cells; rad]
-        Both within the map.
+        Poses within the map.
+    nodes : Nodes
+    heap : ndarray of int64, shape (room, 2)
+
+    Returns
+    -------
+    ndarray of int64, shape (6,)
+        Heap size, key of the best cost, node at which its last curve begins, number of expanded
+        nodes, number of nodes, expansions until the next curve to the goal.
     """
     state = np.zeros(STATE_SIZE, dtype=np.int64)
-    state[BEST], state[LAST] = FAR, -1
+    state[BEST], state[TARGET] = FAR, -1
     nodes.table[:] = -1
     row, col = math.floor(start[1]), math.floor(start[0])
     far = distance_of(field, ground.blocked.shape[1], row * ground.blocked.shape[1] + col)
@@ -119,10 +140,27 @@ def advance(
 ) -> int:
     """Expand up to `budget` nodes.
 
+    Parameters
+    ----------
+    ground : Ground
+    shape : Shape
+    field : Field
+    prices : Prices
+    drive : Drive
+    goal : ndarray, shape (3,) [cells; rad]
+    nodes : Nodes
+    heap : ndarray of int64, shape (room, 2)
+        Keyed by cost + weight · estimate; ties are broken by the smaller estimate.
+    state : ndarray of int64, shape (6,)
+        As returned by `begin`.
+    shot : Shot
+        The last curve of the best route; overwritten by a better one.
+    budget : int
+
     Returns
     -------
     int
-        `FOUND`, `EXHAUSTED`, `SLICE_DONE`, or `FULL` (call again with more room).
+        `FOUND`, `EXHAUSTED`, `SLICE_DONE`, or `HEAP_FULL` (call again with more room).
     """
     end, motions = state[EXPANDED] + budget, TURNS * drive.gears
     while state[SIZE] > 0 and heap[0, 0] < state[BEST]:
@@ -133,10 +171,10 @@ def advance(
             or state[COUNT] + motions > len(nodes.costs)
             or 2 * (state[COUNT] + motions) > len(nodes.table)
         ):
-            return FULL
+            return HEAP_FULL
         node = top_node(heap)
         state[SIZE] = drop_top(heap, state[SIZE])
-        if nodes.closed[node]:  # it came out before, at a lower cost
+        if nodes.closed[node]:  # expanded before, at a lower cost
             continue
         nodes.closed[node] = True
         state[EXPANDED] += 1
@@ -150,8 +188,14 @@ def advance(
 
 
 @njit(cache=True, nogil=True)
-def refile(nodes: Nodes, count: int) -> None:
-    """Enter the first `count` nodes in an empty table."""
+def rebuild_table(nodes: Nodes, count: int) -> None:
+    """Rebuild the table from the first `count` nodes.
+
+    Parameters
+    ----------
+    nodes : Nodes
+    count : int
+    """
     nodes.table[:] = -1
     for node in range(count):
         nodes.table[_slot(nodes.table, nodes.keys, nodes.keys[node])] = node
@@ -159,7 +203,20 @@ def refile(nodes: Nodes, count: int) -> None:
 
 @njit(cache=True, nogil=True)
 def drive_along(shape: Shape, start: Floats, curvatures: Floats, lengths: Floats) -> Floats:
-    """Return the poses along motions, as `motion_clear` cuts them, shape (n, 3)."""
+    """Return the poses along motions, at the steps of `motion_clear`.
+
+    Parameters
+    ----------
+    shape : Shape
+    start : ndarray, shape (3,) [cells; rad]
+    curvatures : ndarray, shape (m,) [1/cells]
+    lengths : ndarray, shape (m,) [cells]
+        Negative for motions backward.
+
+    Returns
+    -------
+    ndarray, shape (n, 3) [cells; rad]
+    """
     total = 1
     for i in range(len(lengths)):
         total += cuts(shape, curvatures[i], lengths[i])
@@ -191,7 +248,7 @@ def _try(
     node: int,
     motion: int,
 ) -> None:
-    """Drive one motion from a node, and keep where it leads if that is worth it."""
+    """Drive one motion from a node; keep its end if it is clear and the cheapest in its bin."""
     gear, turn = steering(motion)
     from_x, from_y, from_yaw = nodes.poses[node]
     curvature, length = turn * drive.curvature, gear * reach(drive, turn)
@@ -237,7 +294,7 @@ def _shoot(
     state: Ints,
     shot: Shot,
 ) -> None:
-    """Try the curve from a node to the goal; keep it if it is clear and makes the best route."""
+    """Check the curve from a node to the goal; keep it if it is clear and gives the best route."""
     lengths, turns = np.zeros(SEGMENTS), np.zeros(SEGMENTS, dtype=np.int64)
     x, y, yaw = nodes.poses[node]
     rest = curve_of(drive, goal, x, y, yaw, lengths, turns)
@@ -260,7 +317,7 @@ def _shoot(
             )
             x, y, yaw = along(x, y, yaw, curvature, length / count)
     if total * ONE < state[BEST]:
-        state[BEST], state[LAST] = key_of(total), node
+        state[BEST], state[TARGET] = key_of(total), node
         shot.lengths[:], shot.turns[:] = lengths, turns
 
 
@@ -272,7 +329,7 @@ def _key(cols: int, bins: int, x: float, y: float, yaw: float) -> int:
 
 @njit(cache=True, nogil=True)
 def _slot(table: Ints32, keys: Ints, key: int) -> int:
-    """Return the place of a key in the table: its node's, or the free one where it belongs."""
+    """Return the index of a key in the table, or the free one at which to insert it."""
     mask = len(table) - 1
     slot = ((key * HASH) >> 20) & mask
     while table[slot] >= 0 and keys[table[slot]] != key:

@@ -1,9 +1,9 @@
-"""How far cells are from the goal for a point that keeps away from what is blocked, grown lazily.
+"""Distances to the goal for a point that keeps clearance from blocked cells, computed lazily.
 
-Dijkstra's algorithm on small integer costs (29 and 41 are a side and a diagonal, 0.03 % short of
-the square root of 2) with a ring of buckets, each a doubly linked list of cells: a cell is in one
-bucket at most, and moves between them in constant time (Dial 1969). The search stops when the cell
-that was asked for is settled, and goes on from there when the next is asked for.
+Dijkstra's algorithm on small integer costs (29 for a side and 41 for a diagonal, whose ratio is
+0.03 % below the square root of 2) with a ring of buckets, each a doubly linked list of cells: a
+cell is in at most one bucket, and moves between buckets in constant time (Dial 1969). The search
+stops when the requested cell is settled, and continues from there with the next request.
 """
 
 from __future__ import annotations
@@ -17,27 +17,34 @@ from groundmap.arrays import Bools, Bytes, Ints, Ints32
 from planners.costmap.kernels.moves import COLS, ROWS
 
 SIDE, SLANT = 29, 41
-DOUBT = 4  # a step on or off a cell that only may be wide enough counts as that many
+DOUBT = 4  # factor on a step to or from a narrow cell
 BUCKETS = SLANT * DOUBT + 1
 UNREACHED = np.iinfo(np.int32).max
 LEVEL, QUEUED = range(2)  # entries of `state`
 
 
 class Field(NamedTuple):
-    """The distances found so far, and what is needed to go on."""
+    """The distances found so far, and the state of the search."""
 
     moves: Bytes  #: shape (cells,); allowed moves of every cell, a bit each; none leaves the map
-    narrow: Bools  #: shape (cells,); whether it only may be wide enough
-    distances: Ints32  #: shape (cells,); final up to the level; `UNREACHED` where none was found
-    links: Ints32  #: shape (cells + 1, 2); of queued cells, the next and the one before in its
-    #: bucket, or -1; what is written to the last row, which is that of -1, is never read
-    heads: Ints32  #: shape (BUCKETS,); the first cell of every bucket, or -1
-    state: Ints  #: shape (2,); distance that the search has come to, and number of queued cells
+    narrow: Bools  #: shape (cells,); the centre is not wide enough, other points may be
+    distances: Ints32  #: shape (cells,); final up to the level; initially `UNREACHED`
+    links: Ints32  #: shape (cells + 1, 2); next and previous cell in a queued cell's bucket,
+    #: or -1; the last row, to which -1 refers, is written but never read
+    heads: Ints32  #: shape (BUCKETS,); first cell of every bucket, or -1
+    state: Ints  #: shape (2,); distance that the search has reached, number of queued cells
 
 
 @njit(cache=True, nogil=True)
 def seed_field(field: Field, goal: int) -> None:
-    """Begin at a goal's cell."""
+    """Reset a field for another goal.
+
+    Parameters
+    ----------
+    field : Field
+    goal : int
+        Index of the goal's cell.
+    """
     field.distances[:] = UNREACHED
     field.heads[:] = -1
     field.distances[goal] = 0
@@ -48,7 +55,20 @@ def seed_field(field: Field, goal: int) -> None:
 
 @njit(cache=True, nogil=True)
 def distance_of(field: Field, width: int, cell: int) -> int:
-    """Return the distance of a cell, growing the field until it is settled."""
+    """Return the distance of a cell, after continuing the search until it is settled.
+
+    Parameters
+    ----------
+    field : Field
+    width : int
+        Cells in a row.
+    cell : int
+
+    Returns
+    -------
+    int
+        In units of 1/29 cell; `UNREACHED` if there is no path.
+    """
     moves, narrow, distances = field.moves, field.narrow, field.distances
     level, queued = field.state
     if distances[cell] > level and queued > 0:
@@ -71,9 +91,9 @@ def _grow(
     queued: int,
     cell: int,
 ) -> tuple[int, int]:
-    """Go on until a cell is settled, or none is left; return the new level and number of cells.
+    """Search until a cell is settled or the queue is empty; return the new level and queue size.
 
-    Queueing is written out: as calls, it would cost more than all the rest.
+    The queue operations are written inline, as calls would take most of the time.
     """
     while distances[cell] > level and queued > 0:
         node = heads[level % BUCKETS]

@@ -1,6 +1,6 @@
-"""The motions of hybrid A*, what they cost, and what is left to the goal at least; all in cells.
+"""The motions of hybrid A*, their costs, and estimates of the remaining cost; all in cells.
 
-Motions are numbered: to the right, straight and to the left, and then the same backwards.
+Motions are numbered: to the right, straight and to the left, then the same backward.
 """
 
 from __future__ import annotations
@@ -16,46 +16,59 @@ from planners.geometry.kernels.curves import SEGMENTS, along, dubins_word, reeds
 
 TURNS = 3  # motions of one gear
 ROOT = -1  # no motion: the start
-DETOUR = 7.3  # [radii] no curve, even forward only, needs more beyond the straight distance
+DETOUR = 7.3  # [radii] largest excess of a curve, even forward only, over the straight distance
 
 
 class Drive(NamedTuple):
-    """How the robot moves, and what that costs."""
+    """The robot's motions and penalties [cells]."""
 
     step: float  #: length of a straight motion
-    arc: float  #: length of a turning motion: half a circle at most, as more turns the other way
-    curvature: float  #: at the steering's stop
-    gears: int  #: 1: forward only; 2: both ways
-    reverse: float  #: what a cell's side driven backwards costs
-    cusp: float  #: what a change of gear costs
-    steer: float  #: what turning the steering from stop to stop costs
-    bins: int  #: of headings
-    ratio: float  #: a curve is tried after as many nodes as steps remain, divided by this
-    weight: float  #: how much more than itself the guess of what is left counts
+    arc: float  #: length of a turning motion: at most half a circle
+    curvature: float  #: curvature at the steering's stop
+    gears: int  #: 1: forward only; 2: forward and backward
+    reverse: float  #: factor on lengths that are driven backward
+    cusp: float  #: cost of a change of gear
+    steer: float  #: cost of turning the steering from stop to stop
+    bins: int  #: number of heading bins
+    ratio: float  #: expansions between two curves to the goal: the remaining steps divided by this
+    weight: float  #: factor on the estimate of the remaining cost
 
 
 class Prices(NamedTuple):
-    """What a length costs where, as a multiple of itself."""
+    """Costs of cells, and the factors on lengths that they stand for."""
 
     costs: Bytes  #: shape (rows, cols)
-    factors: Floats  #: shape (256,) by cost; shape (1,) if every cell's is 1
+    factors: Floats  #: shape (256,), by cost; shape (1,) if all are 1
 
 
 @njit(cache=True, nogil=True)
 def steering(motion: int) -> tuple[int, int]:
-    """Return the gear of a motion, 1 or -1, and its turn: 1 to the left, 0 or -1."""
+    """Return a motion's gear, 1 or -1, and its turn: 1 to the left, 0 straight, -1 to the right."""
     return 1 if motion < TURNS else -1, motion % TURNS - 1
 
 
 @njit(cache=True, nogil=True)
 def reach(drive: Drive, turn: int) -> float:
-    """Return the length of a motion with a turn."""
+    """Return the length of a motion [cells].
+
+    Parameters
+    ----------
+    drive : Drive
+    turn : int
+        1 to the left, 0 straight, -1 to the right.
+    """
     return drive.step if turn == 0 else drive.arc
 
 
 @njit(cache=True, nogil=True)
 def pieces(drive: Drive, length: float) -> int:
-    """Return into how many motions a segment of a curve is cut."""
+    """Return the number of motions into which a segment of a curve is cut.
+
+    Parameters
+    ----------
+    drive : Drive
+    length : float [cells]
+    """
     return max(1, math.ceil(abs(length) / drive.step))
 
 
@@ -63,7 +76,17 @@ def pieces(drive: Drive, length: float) -> int:
 def curve_of(
     drive: Drive, goal: Floats, x: float, y: float, yaw: float, lengths: Floats, turns: Ints
 ) -> float:
-    """Find the cheapest curve to the goal, heedless of obstacles; return its cost."""
+    """Return the cost of the cheapest curve to the goal, without regard to obstacles.
+
+    Parameters
+    ----------
+    drive : Drive
+    goal : ndarray, shape (3,) [cells; rad]
+    x, y, yaw : float [cells; rad]
+    lengths : ndarray, shape (5,) [radii]
+    turns : ndarray of int64, shape (5,)
+        Both are overwritten with the curve's segments.
+    """
     dx, dy = (goal[0] - x) * drive.curvature, (goal[1] - y) * drive.curvature
     cosine, sine = math.cos(yaw), math.sin(yaw)
     u, v, turn = cosine * dx + sine * dy, cosine * dy - sine * dx, wrap(goal[2] - yaw)
@@ -75,7 +98,21 @@ def curve_of(
 
 @njit(cache=True, nogil=True)
 def guess_of(drive: Drive, goal: Floats, x: float, y: float, yaw: float, far: float) -> float:
-    """Return the larger of the way around obstacles and the way that the steering allows."""
+    """Return an estimate of the remaining cost, from the distance field and the steering.
+
+    Parameters
+    ----------
+    drive : Drive
+    goal : ndarray, shape (3,) [cells; rad]
+    x, y, yaw : float [cells; rad]
+    far : float [cells]
+        Length of the shortest path around obstacles.
+
+    Returns
+    -------
+    float
+        The larger one of `far` and the cost of the cheapest curve without regard to obstacles.
+    """
     if far >= math.hypot(goal[0] - x, goal[1] - y) + DETOUR / drive.curvature:
         return far
     lengths, turns = np.empty(SEGMENTS), np.empty(SEGMENTS, dtype=np.int64)
@@ -84,7 +121,16 @@ def guess_of(drive: Drive, goal: Floats, x: float, y: float, yaw: float, far: fl
 
 @njit(cache=True, nogil=True)
 def change_of(drive: Drive, motion: int, gear: int, turn: int) -> float:
-    """Return what it costs to go on after a motion in another gear or with another steering."""
+    """Return the cost of a change of gear and steering after a motion.
+
+    Parameters
+    ----------
+    drive : Drive
+    motion : int
+        The previous motion, or `ROOT`.
+    gear, turn : int
+        Those of the next motion.
+    """
     if motion == ROOT:
         return 0.0
     gear_before, turn_before = steering(motion)
@@ -103,7 +149,19 @@ def price_of(
     curvature: float,
     length: float,
 ) -> float:
-    """Return what a motion costs: the cells half-way and at its end count for half of it each."""
+    """Return the cost of a motion, with the mean factor of the cells half-way and at its end.
+
+    Parameters
+    ----------
+    costs : ndarray of uint8, shape (rows, cols)
+    factors : ndarray, shape (256,) or (1,)
+    reverse : float
+    x, y, yaw : float [cells; rad]
+        Pose at the beginning.
+    curvature : float [1/cells]
+    length : float [cells]
+        Negative for a motion backward.
+    """
     cost = length if length > 0.0 else -reverse * length
     if len(factors) == 1:
         return cost

@@ -1,19 +1,20 @@
-"""Jump point search on an 8-connected grid whose metres all cost the same; no corner is cut.
+"""Jump point search on an 8-connected grid of uniform costs; no corner is cut.
 
-Of all equally long ways, jump point search (Harabor and Grastien 2011, 2014) follows those that
-turn diagonal as early as they can. After a straight step only straight on is worth a look, unless
-beside the step's beginning is a wall and beside its end is none: the cell beside the end, and the
-diagonal to it, aren't reached as well in another way, and the end is a *jump point*. After a
-diagonal step only the diagonal and the two straight headings beside it are.
+Of all equally short paths, jump point search (Harabor and Grastien 2011, 2014) follows those whose
+diagonal steps come first. After a straight step, only the same heading is followed, unless there is
+a wall beside the step's first cell and none beside its last: then no other path reaches the cell
+beside the last one, and the one diagonally ahead, as cheaply, and the last cell is a *jump point*.
+After a diagonal step, only the diagonal and the two straight headings beside it are followed.
 
-Only sources, jump points and targets are ever labelled: straight jumps pass all other cells
-(`planners.search.kernels.jps_jumps`). Diagonals are followed to their ends, with jumps from their
-cells to either side; these cells aren't labelled either.
+Only sources, jump points and targets are labelled: straight jumps pass all other cells
+(`planners.search.kernels.jps_jumps`). Diagonals are followed to their ends, with straight jumps
+from their cells to both sides; these cells are not labelled either.
 
-One parent per node is enough, though it decides what is worth a look. Say that of two equally good
-parents the one kept prunes a step of a shortest way. Then that step is a diagonal, after a straight
-run; taken before the run, it makes as short a way, which ends in a straight step. And no parent
-prunes a straight step of a shortest way. So every cell is still passed at its least cost.
+One parent per node suffices, although it decides which headings are followed. Assume that of two
+equally good parents, the kept one prunes a step of a shortest path. Then this step is diagonal and
+follows a straight run. Taken before the run, it gives an equally short path that ends in a straight
+step, and no parent prunes a straight step of a shortest path. So every cell is still passed at its
+least cost.
 
 Nodes, moves, headings, costs and the status of a search are those of
 `planners.search.kernels.astar`.
@@ -67,15 +68,16 @@ def advance(
     targets : ndarray of int64, shape (n, 3)
         Row, column and final cost of the cells that are joined to the goal.
     labels : ndarray of int64, shape (cells, 2)
-        Per cell the cost so far and a mark: `MARK` times the query's number, `CLOSED` if it is,
-        the last heading of the jump that led here (4 bits from bit `CAME`; `ROOT`: none did), and
-        the node where that began (32 bits). Nothing needs clearing between queries: marks of
-        earlier ones are less than `MARK` times the number.
+        Per cell the cost so far and a mark: `MARK` times the query's number, `CLOSED` if closed,
+        the last heading of the jump that led here (4 bits from bit `CAME`; `ROOT` for a source),
+        and the node where the jump began (32 bits). Marks of earlier queries are less than `MARK`
+        times the number, so labels need no reset between queries.
     heap : ndarray of int64, shape (room, 2)
-        Keyed by f = g + h; ties go to the smaller h, that is, to the larger g.
+        Keyed by f = g + h; ties are broken by the smaller h, that is, by the larger g.
     state : ndarray of int64, shape (5,)
         Heap size, best total cost, its target, number of expanded nodes, `MARK` times the number
         of the query (from 1).
+    budget : int
 
     Returns
     -------
@@ -85,16 +87,16 @@ def advance(
     height, width = moves.shape
     size, best, expanded, fresh = state[SIZE], state[BEST], state[EXPANDED], state[FRESH]
     end = expanded + budget
-    most = 8 * min(height, width) + 8  # pushes of one node: two for each cell of four diagonals
+    most = 8 * min(height, width) + 8  # entries of one node: two for each cell of four diagonals
     status = EXHAUSTED
-    while size > 0 and heap[0, 0] < best:  # nothing else that waits can better `best`
+    while size > 0 and heap[0, 0] < best:  # no other open node can improve `best`
         if expanded >= end or size + most > len(heap):
             status = SLICE_DONE if expanded >= end else HEAP_FULL
             break
         node = top_node(heap)
         size = drop_top(heap, size)
         mark = labels[node, 1]
-        if mark & CLOSED:  # it came out before, at a lower cost
+        if mark & CLOSED:  # expanded before, at a lower cost
             continue
         labels[node, 1] = mark | CLOSED
         expanded += 1
@@ -106,14 +108,14 @@ def advance(
         wanted = headings(moves, row, col, (mark >> CAME) & 15)
         for k in range(8):
             r, c, cost, going = row, col, labels[node, 0], (wanted >> k) & 1 != 0
-            # What follows stays in one function: passing all arrays on costs more than a jump.
+            # This loop is not a function of its own: passing all arrays costs more than a jump.
             while going:
                 side = 0
                 if k & 1:
                     n = diagonal_jump(moves, jumps, targets, r, c, k)
                     if n == 0:
                         break
-                    side = 1 if n > 0 else 0  # 0: a target, which is labelled itself
+                    side = 1 if n > 0 else 0  # 0: a target, which is labelled
                     n = abs(n)
                     r, c, cost = r + n * ROWS[k], c + n * COLS[k], cost + n * DIAGONAL
                 going = side == 1
@@ -136,7 +138,13 @@ def advance(
 
 @njit(cache=True, nogil=True)
 def final_cost(targets: Ints, row: int, col: int) -> int:
-    """Return the final cost of a cell; `FAR` if it is no target."""
+    """Return the final cost of a cell; `FAR` if it is not a target.
+
+    Parameters
+    ----------
+    targets : ndarray of int64, shape (n, 3)
+    row, col : int
+    """
     for t in range(len(targets)):
         if row == targets[t, 0] and col == targets[t, 1]:
             return int(targets[t, 2])
@@ -145,7 +153,15 @@ def final_cost(targets: Ints, row: int, col: int) -> int:
 
 @njit(cache=True, nogil=True)
 def headings(moves: Bytes, row: int, col: int, came: int) -> int:
-    """Return the headings, as bits, that are worth a look at a cell reached with `came`."""
+    """Return the headings to follow from a cell, as bits.
+
+    Parameters
+    ----------
+    moves : ndarray of uint8, shape (rows, cols)
+    row, col : int
+    came : int
+        Heading that led to the cell, or `ROOT`.
+    """
     allowed = int(moves[row, col])
     if came == ROOT:
         return allowed
@@ -163,7 +179,14 @@ def headings(moves: Bytes, row: int, col: int, came: int) -> int:
 
 @njit(cache=True, nogil=True)
 def trace(labels: Ints, width: int, node: int) -> Ints:
-    """Return the cells where the path to `node` begins, turns and ends, last first."""
+    """Return the cells where the path to a node begins, turns and ends, last first.
+
+    Parameters
+    ----------
+    labels : ndarray of int64, shape (cells, 2)
+        As in `advance`.
+    width, node : int
+    """
     turns, after = [node], ROOT
     came = (labels[node, 1] >> CAME) & 15
     while came != ROOT:

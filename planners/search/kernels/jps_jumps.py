@@ -1,15 +1,16 @@
-"""How far jump point search may jump, looked up in a bitmap of stops or in a table of jumps.
+"""Lengths of jumps for jump point search, from a bitmap of stops or a table of jumps.
 
-A jump is a number: n > 0 says that the next jump point is n cells away, n <= 0 that there is none,
-and that -n cells can be passed before the wall.
+A jump is a number n: if n > 0, the next jump point is n cells away; if n <= 0, there is none, and
+-n cells can be passed before the wall.
 
 The bitmap, an int64 array of shape (words, 2), has two bits for every cell and straight heading:
-whether to stop there, at a wall or a jump point, and whether it is a wall. Bits run with the
-heading, lowest first, in whole words; every line of them has a wall after its last cell. There
-are the rows eastwards, the rows westwards, the columns northwards and the columns southwards.
+whether a jump stops there, at a wall or a jump point, and whether the cell is a wall. Bits follow
+the heading, lowest first. Each line of cells takes whole words and has a wall after its last cell.
+The lines are the rows eastwards, the rows westwards, the columns northwards and the columns
+southwards.
 
-The table, of shape (rows, cols, 8), holds the jump from every cell with every heading; a diagonal
-jump leads to the next cell from which straight jumps to the sides lead anywhere.
+The table, of shape (rows, cols, 8), holds the jump from every cell with every heading. A diagonal
+jump leads to the next cell from which a straight jump to a side reaches a jump point.
 """
 
 from __future__ import annotations
@@ -32,8 +33,23 @@ BIT_OF[[((DE_BRUIJN << bit) % 2**64) >> 58 for bit in range(64)]] = range(64)
 
 @njit(cache=True, nogil=True)
 def straight_jump(moves: Bytes, jumps: Jumps, targets: Ints, row: int, col: int, k: int) -> int:
-    """Return the cells to the jump point or target that a straight heading leads to; 0 for none."""
-    if jumps.ndim == 3:  # known when numba compiles: the other branch is left out
+    """Return the distance to the next jump point or target on a straight heading; 0 for none.
+
+    Parameters
+    ----------
+    moves : ndarray of uint8, shape (rows, cols)
+        Allowed moves of every cell.
+    jumps : ndarray of int, shape (words, 2) or (rows, cols, 8)
+    targets : ndarray of int64, shape (n, 3)
+        Row, column and final cost.
+    row, col, k : int
+        Cell and heading.
+
+    Returns
+    -------
+    int [cells]
+    """
+    if jumps.ndim == 3:  # constant for numba, which drops the other branch
         n = int(jumps[row, col, k])
     else:
         n = scan(jumps, moves.shape[0], moves.shape[1], row, col, k)
@@ -49,9 +65,17 @@ def straight_jump(moves: Bytes, jumps: Jumps, targets: Ints, row: int, col: int,
 
 @njit(cache=True, nogil=True)
 def diagonal_jump(moves: Bytes, jumps: Jumps, targets: Ints, row: int, col: int, k: int) -> int:
-    """Return the steps along a diagonal to the next cell to look to the sides from.
+    """Return the steps along a diagonal to the next cell from which straight jumps are tried.
 
-    0 if there is none; minus the steps if that cell is a target.
+    Parameters
+    ----------
+    moves, jumps, targets, row, col, k
+        As in `straight_jump`.
+
+    Returns
+    -------
+    int
+        0 if there is no such cell; negative if it is a target.
     """
     if jumps.ndim == 2:
         n = (int(moves[row, col]) >> k) & 1
@@ -59,8 +83,8 @@ def diagonal_jump(moves: Bytes, jumps: Jumps, targets: Ints, row: int, col: int,
         n = int(jumps[row, col, k])
         passed = abs(n)
         for t in range(len(targets)):
-            # Where the diagonal first crosses the target's row or column: from there a straight
-            # jump may lead to it. Where it crosses the other one, the target lies behind.
+            # A straight jump may reach the target from the cell where the diagonal first crosses
+            # its row or column. At the second crossing, the target lies behind.
             away = min((targets[t, 0] - row) * ROWS[k], (targets[t, 1] - col) * COLS[k])
             if 0 < away <= passed and (n <= 0 or away < n):
                 n = away
@@ -73,7 +97,17 @@ def diagonal_jump(moves: Bytes, jumps: Jumps, targets: Ints, row: int, col: int,
 
 @njit(cache=True, nogil=True)
 def scan(stops: Jumps, height: int, width: int, row: int, col: int, k: int) -> int:
-    """Return the jump with a straight heading to the next jump point, 64 cells at a time."""
+    """Return the straight jump to the next jump point, from a scan of 64 cells at a time.
+
+    Parameters
+    ----------
+    stops : ndarray of int64, shape (words, 2)
+        Bitmap of stops.
+    height, width : int
+        Rows and columns of the grid.
+    row, col, k : int
+        Cell and heading.
+    """
     row_words, col_words = width // 64 + 1, height // 64 + 1
     if k == 0:
         first, at = row * row_words, col

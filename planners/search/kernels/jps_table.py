@@ -1,4 +1,4 @@
-"""The table of jumps from every cell with every heading, for JPS+ (Rabin 2015)."""
+"""Construction of the table of jumps for JPS+ (Rabin 2015)."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from planners.search.kernels.jps_jumps import Jumps
 
 @njit(cache=True, nogil=True)
 def fill_table(moves: Bytes, table: Jumps) -> None:
-    """Fill in the table that is described in `planners.search.kernels.jps_jumps`.
+    """Fill the table of jumps; `planners.search.kernels.jps_jumps` describes it.
 
     Parameters
     ----------
     moves : ndarray of uint8, shape (rows, cols)
         Allowed moves of every cell, as in `planners.search.kernels.astar`.
     table : ndarray of int, shape (rows, cols, 8)
-        Of a type that holds the number of rows and of columns; overwritten.
+        Overwritten. Its type must hold the number of rows and of columns.
     """
     rows = len(moves)
     for row in range(rows - 1, -1, -1):
@@ -31,7 +31,15 @@ def fill_table(moves: Bytes, table: Jumps) -> None:
 
 @njit(cache=True, nogil=True)
 def fill_row(moves: Bytes, table: Jumps, row: int, k: int) -> None:
-    """Fill in a row's jumps with one heading, once those of the row that it leads to are there."""
+    """Fill a row's jumps with one heading, after those of the row that it leads to.
+
+    Parameters
+    ----------
+    moves, table
+        As in `fill_table`.
+    row, k : int
+        Row and heading.
+    """
     cols = moves.shape[1]
     for i in range(cols):
         col = cols - 1 - i if COLS[k] > 0 else i

@@ -1,8 +1,8 @@
 """Exact distances from half-cell lattice points to the nearest blocked square.
 
 The lattice is that of `planners.costmap.moves`. Distances are those of
-`planners.costmap.kernels.distance`, made the same way: down each column of cells first, then along
-each line of the lattice, as the lower envelope of parabolas that stand on the columns' borders.
+`planners.costmap.kernels.distance`, and so is the method: first along each column of cells, then
+along each line of the lattice, as the lower envelope of parabolas at the columns' borders.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def squared_clearance(blocked: Bools) -> Ints32:
     Returns
     -------
     ndarray of int32, shape (2 rows + 1, 2 cols + 1) [(half cells)²]
-        At most `NOWHERE`, which it is throughout if no cell is blocked.
+        At most `NOWHERE`; `NOWHERE` everywhere if no cell is blocked.
     """
     rows, cols = blocked.shape
     squared = np.empty((2 * rows + 1, 2 * cols + 1), dtype=np.int32)
@@ -55,7 +55,7 @@ def squared_clearance(blocked: Bools) -> Ints32:
 def _down_columns(blocked: Bools) -> Ints32:
     """Return the vertical distance to the nearest blocked square of the same column [half cells].
 
-    Shape (2 rows + 1, cols); 2 rows + 1 where the column has none.
+    Shape (2 rows + 1, cols); 2 rows + 1 in a column without blocked cells.
     """
     rows, cols = blocked.shape
     far = 2 * rows + 1

@@ -1,16 +1,17 @@
 """Polyanya: shortest routes at any angle on a mesh of convex polygons, in slices.
 
 A search node is a root (the last turning point), a cone of directions from it, and the side of a
-polygon through which the cone leaves that polygon: it stands for all lines that turn at the root
-last and cross the side within the cone. To expand it is to look at the sides of the polygon
-beyond. Those within the cone are seen by the same root. Where an end of the interval is a corner,
+polygon through which the cone leaves that polygon. It represents all lines whose last turn is at
+the root and that cross the side within the cone. Its expansion visits the sides of the polygon
+beyond. Sides within the cone are seen from the same root. If an end of the interval is a corner,
 lines may turn there towards sides beside the cone.
 
-A cone's rays are kept as differences of vertices and are never rounded to where they meet a side:
-with roots on the lattice, all decisions are exact, and what shares a border shares it exactly.
+A cone's rays are stored as differences of vertices and are never rounded to their intersections
+with sides. With roots on the lattice, all decisions are exact, and cones that share a border share
+it exactly.
 
-Lines without area (spurs), and vertices where squares meet in a point only, are crossed by point
-nodes: a root with all that lies around it, or, where a line came from one side, all beyond that.
+Spurs (lines without area) and vertices where squares meet in one point only are crossed by point
+nodes: a root with everything around it or, if a line arrived from one side, everything beyond.
 """
 
 from __future__ import annotations
@@ -22,17 +23,23 @@ from numba import njit
 
 from groundmap.arrays import Ints
 from planners.costmap.kernels.moves import ONE
-from planners.search.kernels.astar import EXHAUSTED, FAR, FOUND, HEAP_FULL, SLICE_DONE
+from planners.search.kernels.astar import (
+    BEST,
+    EXHAUSTED,
+    EXPANDED,
+    FAR,
+    FOUND,
+    HEAP_FULL,
+    SIZE,
+    SLICE_DONE,
+)
 from planners.search.kernels.heap import drop_top, push, top_node
 from planners.search.kernels.polyanya_bound import away, through
 from planners.search.kernels.polyanya_expand import from_interval, from_point
 from planners.search.kernels.polyanya_jit import borrowing
 from planners.search.kernels.polyanya_nodes import (
-    BEST,
     COUNT,
-    EXPANDED,
     SCALE,
-    SIZE,
     SOFAR,
     PolyanyaQuery,
     Polygons,
@@ -54,10 +61,10 @@ def advance(
     query : PolyanyaQuery
     pool : Pool
     state : ndarray of int64, shape (6,)
-        Heap size, nodes made, nodes expanded, least total cost (as a key), the last root on its
-        line, and its target.
+        Heap size, least total cost as a key, its target, number of expanded nodes, number of
+        nodes made, the last root on the best line.
     spare : int
-        Nodes that one expansion makes at most.
+        Number of nodes that one expansion makes at most.
     budget : int
 
     Returns
@@ -73,10 +80,12 @@ def advance(
             return HEAP_FULL
         node = top_node(pool.heap)
         state[SIZE] = drop_top(pool.heap, state[SIZE])
-        # A node with a single successor hands over to it, without the heap.
+        # A single successor is expanded next, without the heap.
         while True:
             made, root, side = state[COUNT], pool.places[node, 0], pool.places[node, 1]
-            if pool.cones[node, SOFAR] <= query.sofar[root]:  # else its root was reached better
+            if (
+                pool.cones[node, SOFAR] <= query.sofar[root]
+            ):  # else a shorter line to its root is known
                 state[EXPANDED] += 1
                 if side < 0:
                     from_point(mesh, query, pool, state, root)
@@ -93,7 +102,14 @@ def advance(
 
 @borrowing
 def enqueue(mesh: Polygons, query: PolyanyaQuery, pool: Pool, state: Ints, node: int) -> None:
-    """Put a node on the heap unless it can't better the best line."""
+    """Put a node on the heap if it can improve the best line.
+
+    Parameters
+    ----------
+    mesh, query, pool, state
+        As in `advance`.
+    node : int
+    """
     root, side = pool.places[node, 0], pool.places[node, 1]
     x, y = at(mesh, root)
     if side < 0:
@@ -112,7 +128,14 @@ def enqueue(mesh: Polygons, query: PolyanyaQuery, pool: Pool, state: Ints, node:
 
 @njit(cache=True, nogil=True)
 def trace(came: Ints, root: int) -> Ints:
-    """Return the roots on the line to a root, itself included, first to last."""
+    """Return the roots on the line to a root, including itself, first to last.
+
+    Parameters
+    ----------
+    came : ndarray of int64, shape (vertices,)
+        The previous root of each root; -1 for sources.
+    root : int
+    """
     roots = [root]
     while came[root] >= 0:
         root = came[root]

@@ -1,4 +1,4 @@
-"""Where an interval ends, and how far a target is at least when seen through it."""
+"""The ends of an interval, and the least length of a line through it to a target."""
 
 from __future__ import annotations
 
@@ -10,15 +10,25 @@ from planners.search.kernels.polyanya_jit import borrowing
 
 @borrowing
 def cross(ax: float, ay: float, bx: float, by: float) -> float:
-    """Return the cross product of two vectors: above 0 where b lies left of a."""
+    """Return the cross product of two vectors, which is positive if b lies to the left of a.
+
+    Parameters
+    ----------
+    ax, ay, bx, by : float
+    """
     return ax * by - ay * bx
 
 
 @borrowing
-def where(
+def intersect(
     rx: float, ry: float, dx: float, dy: float, ax: float, ay: float, bx: float, by: float
 ) -> tuple[float, float]:
-    """Return where the ray from r along d meets the line a-b, moved onto the piece a-b."""
+    """Return the intersection of the ray from r along d with the line a-b, clamped to a-b.
+
+    Parameters
+    ----------
+    rx, ry, dx, dy, ax, ay, bx, by : float
+    """
     share = cross(rx - ax, ry - ay, dx, dy) / cross(bx - ax, by - ay, dx, dy)
     share = min(max(share, 0.0), 1.0)
     return ax + share * (bx - ax), ay + share * (by - ay)
@@ -40,21 +50,21 @@ def through(
     Parameters
     ----------
     rx, ry : float
-        The root. The interval is what it sees of the side a-b between two rays, from a to the
-        left to b.
+        The root. The interval is the part of the side a-b, with b to the left of a, that is
+        visible from the root between two rays.
     cone : ndarray, shape (4,)
-        Directions of the left and of the right ray; (0, 0) if the root itself is that end.
+        Directions of the left and of the right ray; (0, 0) if the root is at that end.
     ax, ay, bx, by : float
     targets : ndarray, shape (n, 3)
-        x, y and final cost. Targets on the root's side of the interval are mirrored at it.
+        x, y and final cost. A target on the root's side of the interval is mirrored at it.
     """
     at_end = (cone[0] == 0.0 and cone[1] == 0.0) or (cone[2] == 0.0 and cone[3] == 0.0)
     left_x, left_y, right_x, right_y = bx, by, ax, ay
     if not at_end:
         if cross(cone[0], cone[1], bx - rx, by - ry) > 0.0:
-            left_x, left_y = where(rx, ry, cone[0], cone[1], ax, ay, bx, by)
+            left_x, left_y = intersect(rx, ry, cone[0], cone[1], ax, ay, bx, by)
         if cross(cone[2], cone[3], ax - rx, ay - ry) < 0.0:
-            right_x, right_y = where(rx, ry, cone[2], cone[3], ax, ay, bx, by)
+            right_x, right_y = intersect(rx, ry, cone[2], cone[3], ax, ay, bx, by)
     least = math.inf
     for k in range(len(targets)):
         x, y, final = targets[k, 0], targets[k, 1], targets[k, 2]
@@ -76,5 +86,10 @@ def through(
 
 @borrowing
 def away(ax: float, ay: float, bx: float, by: float) -> float:
-    """Return the distance between two points."""
+    """Return the distance between two points.
+
+    Parameters
+    ----------
+    ax, ay, bx, by : float
+    """
     return math.sqrt((ax - bx) * (ax - bx) + (ay - by) * (ay - by))

@@ -1,4 +1,4 @@
-"""What a search node of Polyanya sees: the nodes that follow it."""
+"""Expansion of Polyanya's search nodes."""
 
 from __future__ import annotations
 
@@ -19,17 +19,26 @@ from planners.search.kernels.polyanya_nodes import (
     useful,
 )
 
-BESIDE = 1e-10  # [cells²] a root this near to a side lies on it
+BESIDE = 1e-10  # [cells²] tolerance of the cross product for a root on a side
 
 
 @borrowing
 def from_point(mesh: Polygons, query: PolyanyaQuery, pool: Pool, state: Ints, root: int) -> None:
-    """Look from a point: along spurs, and into the polygons around it."""
+    """Expand a point node: along spurs, and into the polygons around it.
+
+    Parameters
+    ----------
+    mesh : Polygons
+    query : PolyanyaQuery
+    pool : Pool
+    state : ndarray of int64, shape (6,)
+    root : int
+    """
     x, y = at(mesh, root)
     for k in range(len(query.targets)):
         if query.targets[k, 0] == x and query.targets[k, 1] == y:
             finish(mesh, query, state, root, k)
-    if root >= len(mesh.spurs):  # a source that is no vertex
+    if root >= len(mesh.spurs):  # a source that is not a vertex
         for i in range(len(query.begun)):
             if query.begun[i, 1] == root:
                 _radiate(mesh, query, pool, state, root, query.begun[i, 0])
@@ -42,7 +51,7 @@ def from_point(mesh: Polygons, query: PolyanyaQuery, pool: Pool, state: Ints, ro
             along_spur = along_spur or beside == came
             reach(mesh, query, pool, state, beside, root)
     if came >= 0 and mesh.kinds[root] == GATE and not along_spur:
-        return  # it came from the squares beside the gate, whose union is convex
+        return  # the line came from the squares beside the gate; their union is convex
     for i in range(mesh.around_first[root], mesh.around_first[root + 1]):
         polygon = mesh.around[i]
         if came < 0 or mesh.kinds[root] != PINCH or _opposite(mesh, root, came, polygon):
@@ -51,7 +60,7 @@ def from_point(mesh: Polygons, query: PolyanyaQuery, pool: Pool, state: Ints, ro
 
 @borrowing
 def _opposite(mesh: Polygons, pinch: int, came: int, polygon: int) -> bool:
-    """Whether a polygon lies on the other side of a pinch than the root that it is seen from."""
+    """Whether a polygon and the previous root lie on opposite sides of a pinch."""
     x, y = at(mesh, pinch)
     away_x, away_y = 0.0, 0.0
     for side in range(mesh.first[polygon], mesh.first[polygon + 1]):
@@ -65,7 +74,7 @@ def _opposite(mesh: Polygons, pinch: int, came: int, polygon: int) -> bool:
 def _radiate(
     mesh: Polygons, query: PolyanyaQuery, pool: Pool, state: Ints, root: int, polygon: int
 ) -> None:
-    """Look from a root in a polygon through all sides that it does not lie on."""
+    """Make nodes from a root in a polygon through all sides that it does not lie on."""
     x, y = at(mesh, root)
     for side in range(mesh.first[polygon], mesh.first[polygon + 1]):
         a, b = mesh.corners[side], mesh.corners[following(mesh, side)]
@@ -85,10 +94,20 @@ def _radiate(
 def from_interval(
     mesh: Polygons, query: PolyanyaQuery, pool: Pool, state: Ints, root: int, cone: Floats, out: int
 ) -> None:
-    """Look through what a cone leaves of side `out` into the polygon beyond.
+    """Expand an interval of side `out` into the polygon beyond.
 
-    Its other sides are met from right to left. What of them lies in the cone is seen from the
-    root; what lies beside it, from the end of the interval on that side, if that is a corner.
+    Its other sides are visited from right to left. Their parts within the cone are seen from the
+    root; the parts beside it are seen from the end of the interval on that side, if it is a corner.
+
+    Parameters
+    ----------
+    mesh : Polygons
+    query : PolyanyaQuery
+    pool : Pool
+    state : ndarray of int64, shape (6,)
+    root : int
+    cone : ndarray, shape (5,)
+    out : int
     """
     x, y = at(mesh, root)
     right, left = mesh.corners[out], mesh.corners[following(mesh, out)]
@@ -115,7 +134,7 @@ def from_interval(
                 lx, ly = (bx - x, by - y) if b_left <= 0.0 else (cone[0], cone[1])
                 rx, ry = (ax - x, ay - y) if a_right >= 0.0 else (cone[2], cone[3])
                 add(query, pool, state, root, side, lx, ly, rx, ry)
-            # Where a side is cut, rays of the new cones go on where the old ones met the corner.
+            # If a side is cut, the new cone's ray continues the old one past the corner.
             hidden_left = turns_left and (a_left >= 0.0 or b_left > 0.0)
             if hidden_left and arrive(mesh, query, left, root):
                 to_bx, to_by, to_ax, to_ay = bx - left_x, by - left_y, ax - left_x, ay - left_y
@@ -134,7 +153,7 @@ def from_interval(
 
 @borrowing
 def _may_turn(mesh: Polygons, root: int, vertex: int, dx: float, dy: float) -> bool:
-    """Whether lines from a root may turn at an end of a side: a corner that the ray meets."""
+    """Whether lines from a root may turn at an end of a side: it is a corner on the cone's ray."""
     if mesh.kinds[vertex] != CORNER or vertex == root:
         return False
     (x, y), (to_x, to_y) = at(mesh, root), at(mesh, vertex)
@@ -144,9 +163,10 @@ def _may_turn(mesh: Polygons, root: int, vertex: int, dx: float, dy: float) -> b
 
 @borrowing
 def _beside(mesh: Polygons, root: int, cone: Floats, vertex: int) -> tuple[float, float]:
-    """Return how far left of the left ray, and of the right ray, a vertex lies.
+    """Return how far a vertex lies to the left of the left ray, and of the right ray.
 
-    The root itself is in its cone, and so is all on that side of a root which is that end.
+    The root is in its own cone. If the root is at an end of the interval, all points are within
+    the cone on that side.
     """
     if vertex == root:
         return -1.0, 1.0
@@ -178,7 +198,7 @@ def _find(
     left: int,
     right: int,
 ) -> None:
-    """Look for targets in a polygon, from the root or from a turn at an end of the interval."""
+    """Finish lines at targets in a polygon, from the root or from an end of the interval."""
     for i in range(len(query.near)):
         if query.near[i, 0] != polygon:
             continue

@@ -1,4 +1,4 @@
-"""How Polyanya's kernels are compiled."""
+"""Compilation of Polyanya's kernels."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 
 def borrowing(kernel: Kernel) -> Kernel:
-    """Compile a function that only borrows its caller's arrays: it makes none, and keeps none.
+    """Compile a function without reference counts; it may neither allocate nor store arrays.
 
-    Its calls then need not count who holds the arrays. The kernels of Polyanya look at a few
-    numbers of many arrays each; with counting, a search node takes 2.3 µs instead of 0.5 µs.
-    Where a function makes an array after all, numba refuses to compile it.
+    Polyanya's kernels read a few numbers from many arrays each; with reference counts, a search
+    node takes 2.3 µs instead of 0.5 µs. Numba refuses to compile a function that allocates an
+    array.
     """
     compiler: Any = njit  # Any: the option is not among those that its type names
     compiled: Kernel = compiler(cache=True, nogil=True, _nrt=False)(kernel)

@@ -1,21 +1,22 @@
-"""Search nodes of Polyanya: what they are, how they are made, and how roots are reached."""
+"""Search nodes of Polyanya: their data, their construction, and the update of roots."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 from groundmap.arrays import Bools, Bytes, Floats, Ints
+from planners.search.kernels.astar import BEST, TARGET
 from planners.search.kernels.polyanya_bound import away
 from planners.search.kernels.polyanya_jit import borrowing
 
 SCALE = 2.0**36  # a cell's side in heap keys
 SOFAR = 4  # column of `cones`
-SIZE, COUNT, EXPANDED, BEST, LAST, TARGET = range(6)  # entries of `state`
-SAME = 1e-13  # lengths are the same that differ by no more than this share and as many cells
+COUNT, LAST = 4, 5  # entries of `state` after those of A*
+SAME = 1e-13  # tolerance of lengths: this share of them plus as many cells
 
 
 class Polygons(NamedTuple):
-    """The mesh, and in its last rows of `points` and `kinds` what one query adds to it."""
+    """The mesh; the last rows of `points` and `kinds` are for the sources of one query."""
 
     points: Floats
     kinds: Bytes
@@ -30,11 +31,11 @@ class Polygons(NamedTuple):
 
 
 class PolyanyaQuery(NamedTuple):
-    """What one query looks for, and what it has found out about vertices."""
+    """The ends of one query, and its labels of polygons and vertices."""
 
     targets: Floats  #: shape (n, 3), x, y and final cost [cells]
-    near: Ints  #: shape (m, 2), polygon and a target that lies in it
-    begun: Ints  #: shape (k, 2), polygon and a source in it that is no vertex
+    near: Ints  #: shape (m, 2), polygon and a target in it
+    begun: Ints  #: shape (k, 2), polygon and a source in it that is not a vertex
     looked_for: Bools  #: shape (p,), polygons in `near`
     open: Bools  #: shape (p,), dead ends that lead to targets
     sofar: Floats  #: shape (v,), least length to each root [cells]
@@ -42,7 +43,7 @@ class PolyanyaQuery(NamedTuple):
 
 
 class Pool(NamedTuple):
-    """Search nodes and the heap of those that wait."""
+    """Search nodes and the heap of open ones."""
 
     cones: Floats  #: shape (room, 5), left and right direction, length to the root
     places: Ints  #: shape (room, 2), root and side; side -1 for point nodes
@@ -51,33 +52,57 @@ class Pool(NamedTuple):
 
 @borrowing
 def at(mesh: Polygons, vertex: int) -> tuple[float, float]:
-    """Return x and y of a vertex."""
+    """Return x and y of a vertex [cells].
+
+    Parameters
+    ----------
+    mesh : Polygons
+    vertex : int
+    """
     return mesh.points[vertex, 0], mesh.points[vertex, 1]
 
 
 @borrowing
 def following(mesh: Polygons, side: int) -> int:
-    """Return the next side of a polygon."""
+    """Return the next side of the same polygon.
+
+    Parameters
+    ----------
+    mesh : Polygons
+    side : int
+    """
     polygon = mesh.owner[side]
     return side + 1 if side + 1 < mesh.first[polygon + 1] else mesh.first[polygon]
 
 
 @borrowing
 def between(mesh: Polygons, a: int, b: int) -> float:
-    """Return the distance between two vertices."""
+    """Return the distance between two vertices [cells].
+
+    Parameters
+    ----------
+    mesh : Polygons
+    a, b : int
+    """
     (ax, ay), (bx, by) = at(mesh, a), at(mesh, b)
     return away(ax, ay, bx, by)
 
 
 @borrowing
 def arrive(mesh: Polygons, query: PolyanyaQuery, vertex: int, came: int) -> bool:
-    """Whether lines may turn at a vertex that the root `came` sees.
+    """Whether lines from the root `came` may turn at a vertex; update the vertex if they may.
 
-    Not if a shorter line to it is known, nor if one as long is that comes from elsewhere: of what
-    lies beyond, all that is best reached this way is also best reached that way. (On a lattice,
-    ways round obstacles are often equally long; with both kept, nodes would double at each.)
-    That is so because this is asked only where something lies round the corner: from a root
-    behind, on the same straight line, nothing does.
+    They may not if a shorter line to the vertex is known, or one of equal length from another root:
+    points beyond are then reached equally well by that line. (On a lattice, paths around obstacles
+    are often equally long; with both kept, the number of nodes would double at each.) This relies
+    on being called only if a side or target is hidden behind the vertex, which is not the case for
+    a root further back on the same straight line.
+
+    Parameters
+    ----------
+    mesh : Polygons
+    query : PolyanyaQuery
+    vertex, came : int
     """
     sofar = query.sofar[came] + between(mesh, came, vertex)
     slack = SAME * (1.0 + sofar)
@@ -91,7 +116,16 @@ def arrive(mesh: Polygons, query: PolyanyaQuery, vertex: int, came: int) -> bool
 def reach(
     mesh: Polygons, query: PolyanyaQuery, pool: Pool, state: Ints, vertex: int, came: int
 ) -> None:
-    """Make a point node of a vertex seen from the root `came`, if that is the best way to it."""
+    """Make a point node of a vertex seen from the root `came`, if no shorter line to it is known.
+
+    Parameters
+    ----------
+    mesh : Polygons
+    query : PolyanyaQuery
+    pool : Pool
+    state : ndarray of int64, shape (6,)
+    vertex, came : int
+    """
     sofar = query.sofar[came] + between(mesh, came, vertex)
     if query.sofar[vertex] - sofar > SAME * (1.0 + sofar):
         query.sofar[vertex], query.came[vertex] = sofar, came
@@ -110,7 +144,17 @@ def add(
     right_x: float,
     right_y: float,
 ) -> None:
-    """Make a node of a cone through a side, or, with side -1, of all around a root."""
+    """Make a node of a cone through a side or, with side -1, a point node.
+
+    Parameters
+    ----------
+    query : PolyanyaQuery
+    pool : Pool
+    state : ndarray of int64, shape (6,)
+    root, side : int
+    left_x, left_y, right_x, right_y : float
+        Directions of the cone's rays.
+    """
     node = state[COUNT]
     cone = pool.cones[node]
     cone[0], cone[1], cone[2], cone[3] = left_x, left_y, right_x, right_y
@@ -121,7 +165,14 @@ def add(
 
 @borrowing
 def useful(mesh: Polygons, query: PolyanyaQuery, side: int) -> bool:
-    """Whether what lies beyond a side can be of use: not nothing, and no dead end without goal."""
+    """Whether there is a polygon beyond a side that is not a dead end without targets.
+
+    Parameters
+    ----------
+    mesh : Polygons
+    query : PolyanyaQuery
+    side : int
+    """
     twin = mesh.twins[side]
     if twin < 0:
         return False
@@ -131,7 +182,15 @@ def useful(mesh: Polygons, query: PolyanyaQuery, side: int) -> bool:
 
 @borrowing
 def finish(mesh: Polygons, query: PolyanyaQuery, state: Ints, root: int, target: int) -> None:
-    """Note a line that turns at `root` last and ends at a target, if it is the best so far."""
+    """Store the line whose last turn is at `root` and that ends at a target, if it is the best.
+
+    Parameters
+    ----------
+    mesh : Polygons
+    query : PolyanyaQuery
+    state : ndarray of int64, shape (6,)
+    root, target : int
+    """
     x, y = at(mesh, root)
     length = away(x, y, query.targets[target, 0], query.targets[target, 1])
     key = int((query.sofar[root] + length + query.targets[target, 2]) * SCALE)

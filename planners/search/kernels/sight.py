@@ -1,9 +1,9 @@
 """Line of sight between cell centres, exact in integers.
 
-The region that routes may use consists of squares between the centres of four cells, and of the
-sides between the centres of two neighbours. Both can be read off the moves: the square above and
-to the right of a centre belongs to it if the step north-east is allowed, the side to the right of
-it if the step east is, and the side above it if the step north is.
+The region that routes may use consists of squares between the centres of four cells, and of sides
+between the centres of two neighbours. The moves define both: the region contains the square to the
+north-east of a centre if the step north-east is allowed, the side to its east if the step east is
+allowed, and the side to its north if the step north is allowed.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ EAST, NORTHEAST, NORTH = 1, 2, 4  # bits of a cell's moves
 
 @njit(cache=True, nogil=True)
 def sight(moves: Bytes, row: int, col: int, to_row: int, to_col: int) -> bool:
-    """Whether the straight line between two cells' centres stays in the region.
+    """Whether the straight line between the centres of two cells stays in the region.
 
     Parameters
     ----------
     moves : ndarray of uint8, shape (rows, cols)
         Allowed moves of every cell, as in `planners.search.kernels.astar`.
     row, col, to_row, to_col : int
-        The two cells. Both can be stood on.
+        The two cells, both traversable.
     """
     rows, cols = abs(to_row - row), abs(to_col - col)
     if rows == 0:
@@ -51,7 +51,7 @@ def sight(moves: Bytes, row: int, col: int, to_row: int, to_col: int) -> bool:
 
 @njit(cache=True, nogil=True)
 def _along(moves: Bytes, row: int, col: int, row_step: int, col_step: int, count: int) -> bool:
-    """Whether `count` sides in a row or column belong to the region, whatever is beside them."""
+    """Whether `count` consecutive sides in a row or column belong to the region."""
     bit = NORTH if row_step else EAST
     belong = True
     for i in range(count):

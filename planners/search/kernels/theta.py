@@ -1,7 +1,7 @@
 """Theta* and Lazy Theta*: A* over the grid's moves, with parents that need not be neighbours.
 
-Costs are floats here, lengths in cells: lines at any angle have no exact sums anyway. The heap
-keeps them as integers of 2^-32 cells.
+Costs are lengths in cells as floats, since lengths at any angle have no exact sums. The heap stores
+them as integers in units of 2^-32 cells.
 """
 
 from __future__ import annotations
@@ -30,13 +30,25 @@ from planners.search.kernels.sight import sight
 
 @njit(cache=True, nogil=True)
 def distance(row: int, col: int, to_row: int, to_col: int) -> float:
-    """Return the distance between two cells' centres [cells]."""
+    """Return the distance between the centres of two cells [cells].
+
+    Parameters
+    ----------
+    row, col, to_row, to_col : int
+    """
     return math.sqrt(float((row - to_row) ** 2 + (col - to_col) ** 2))
 
 
 @njit(cache=True, nogil=True)
 def straight_estimate(row: int, col: int, targets: Floats) -> float:
-    """Return the smallest (distance to a target + its final cost) [cells]."""
+    """Return the smallest (distance to a target + its final cost) [cells].
+
+    Parameters
+    ----------
+    row, col : int
+    targets : ndarray, shape (n, 3)
+        Row, column and final cost [cells].
+    """
     least = math.inf
     for k in range(len(targets)):
         there = distance(row, col, int(targets[k, 0]), int(targets[k, 1])) + targets[k, 2]
@@ -54,7 +66,17 @@ def seed(
     query: int,
     heap: Ints,
 ) -> int:
-    """Begin a query: put the sources, their own parents, on an empty heap; return its size."""
+    """Put the sources, which are their own parents, on an empty heap and return its size.
+
+    Parameters
+    ----------
+    sources, targets : ndarray, shape (n, 3)
+        Row, column and cost [cells] of the cells that are joined to the start, and to the goal.
+    width : int
+        Cells in a row.
+    costs, marks, query, heap
+        As in `advance`.
+    """
     size = 0
     for i in range(len(sources)):
         row, col = int(sources[i, 0]), int(sources[i, 1])
@@ -87,18 +109,19 @@ def advance(
     targets : ndarray, shape (n, 3)
         Row, column and final cost [cells] of the cells that are joined to the goal.
     lazy : bool
-        Look whether a node sees its parent only when it is expanded.
+        Whether to check the line of sight to a node's parent only at the node's expansion.
     costs : ndarray, shape (cells,) [cells]
         Length of the line that leads to each cell.
     marks : ndarray of int64, shape (cells, 2)
-        2 * query + 1 if closed, and the parent; a source is its own. Marks below 2 * query are
-        of earlier queries, so nothing needs clearing.
+        2 * query, plus 1 if closed, and the parent; a source is its own. Marks below 2 * query
+        are from earlier queries, so they need no reset.
     query : int
         Number of this query, from 1.
     heap : ndarray of int64, shape (room, 2)
-        Keyed by f = g + h; ties go to the smaller h.
+        Keyed by f = g + h; ties are broken by the smaller h.
     state : ndarray of int64, shape (4,)
         Heap size, least total cost as a key, its target, number of expanded nodes.
+    budget : int
 
     Returns
     -------
@@ -113,7 +136,7 @@ def advance(
             return HEAP_FULL
         node = top_node(heap)
         state[SIZE] = drop_top(heap, state[SIZE])
-        if marks[node, 0] == 2 * query + 1:  # it came out before, at a lower cost
+        if marks[node, 0] == 2 * query + 1:  # expanded before, at a lower cost
             continue
         if lazy:
             _settle(moves, costs, marks, query, node)
@@ -132,7 +155,14 @@ def advance(
 
 @njit(cache=True, nogil=True)
 def parents(marks: Ints, node: int) -> Ints:
-    """Return the cells where the line to `node` begins, turns and ends, last first."""
+    """Return the cells where the line to a node begins, turns and ends, last first.
+
+    Parameters
+    ----------
+    marks : ndarray of int64, shape (cells, 2)
+        As in `advance`.
+    node : int
+    """
     turns = [node]
     while marks[node, 1] != node:
         node = marks[node, 1]
@@ -153,7 +183,7 @@ def _relax(
     node: int,
     k: int,
 ) -> None:
-    """Reach a neighbour: straight from the node's parent if that sees it, else from the node."""
+    """Reach a neighbour from the node's parent if the line of sight is free, else from the node."""
     width = moves.shape[1]
     row, col = node // width + ROWS[k], node % width + COLS[k]
     to = row * width + col
@@ -172,7 +202,7 @@ def _relax(
 
 @njit(cache=True, nogil=True)
 def _settle(moves: Bytes, costs: Floats, marks: Ints, query: int, node: int) -> None:
-    """Give a node that does not see its parent the best of its closed neighbours instead."""
+    """Replace a parent without line of sight to the node by the best closed neighbour."""
     width, parent = moves.shape[1], marks[node, 1]
     row, col = node // width, node % width
     if parent == node or sight(moves, parent // width, parent % width, row, col):

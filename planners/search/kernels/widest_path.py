@@ -1,13 +1,14 @@
-"""The widest way over the half-cell lattice: how wide it can be, and where wider ones lead.
+"""The widest path over the half-cell lattice: its clearance, and the points that wider paths reach.
 
-Steps lead along the lines of the lattice and between the centres and the corners of cells. The
-clearance of such a step is that of its ends: of the two distances that make up the one to a square,
-across and along, each grows, shrinks, or stays 0 all along the step; and where one grows while the
-other shrinks, at a centre both are odd, so that they are equal at an end of the step at best.
+Steps follow the lines of the lattice, or lead between the centres and the corners of cells. The
+clearance of a step is the smaller one of its ends' clearances: the distance to a square has two
+components, along x and along y, and each of them increases, decreases, or stays 0 throughout the
+step. Where one increases while the other decreases, both are odd at the centre, so they are equal
+at an end of the step if anywhere.
 
-Clearances are compared as integers, squared and in half cells, times `UNIT`: those of the lattice
-are whole, those of the pieces that join a place to it are cut to 2^-30. The lattice is given row by
-row, with a ring of zeros around it.
+Clearances are compared as integers, squared and in half cells, times `UNIT`. Those of the lattice
+are whole; those of the pieces that join a place to it are rounded down to 2^-30. The lattice is
+given row by row, with a border of zeros.
 """
 
 from __future__ import annotations
@@ -21,40 +22,40 @@ from groundmap.arrays import Bytes, Ints, Ints32
 from planners.costmap.kernels.moves import COLS, ROWS
 
 UNIT = 2**30
-NEW, WAITING, REACHED, WIDER = range(4)  # what becomes of a lattice point, see `spread`
+NEW, WAITING, REACHED, WIDER = range(4)  # states of a lattice point, see `spread`
 
 
 @njit(cache=True, nogil=True)
 def spread(squared: Ints32, width: int, sources: Ints, targets: Ints) -> tuple[int, Bytes]:
-    """Return how wide the widest way from a source to a target is, and where wider ones lead.
+    """Return the clearance of the widest path to a target, and the points that wider paths reach.
 
-    From the sources on, points are reached in the order of how wide a way leads to them: what is
-    as clear as the level comes at once, through a queue; what is less clear waits in lists for
-    the level to fall to it. The band from one whole number of half cells to the next that the
-    level is in has a list for each clearance, the bands below have one each.
+    From the sources, points are reached in the order of the clearance of the widest path to them.
+    Points at least as clear as the current level are reached at once, through a queue; others wait
+    in lists until the level decreases to them. The band of the current level, which spans one half
+    cell, has a list for each clearance; each band below has one list.
 
     Parameters
     ----------
     squared : ndarray of int32, shape (points,) [(half cells)²]
-        Squared clearance on the lattice; no way leads over points where it is 0.
+        Squared clearance on the lattice; points of clearance 0 are not reached.
     width : int
-        Points in a row: an odd number, which makes the centres and corners even.
+        Points in a row: an odd number, so that the indices of centres and corners are even.
     sources, targets : ndarray of int64, shape (n, 2)
-        Point, and squared clearance of the way to there times `UNIT`, no more than that of the
-        point; of sources there is one at least, and the clearest is first.
+        Point, and squared clearance of the piece to it times `UNIT`, at most that of the point.
+        There is at least one source, and the clearest comes first.
 
     Returns
     -------
     int
-        Least squared clearance on the way times `UNIT`; 0 if there is no way.
+        Least squared clearance on the path times `UNIT`; 0 if there is no path.
     ndarray of uint8, shape (points,)
-        `WIDER` at the points that a wider way leads to than to the targets.
+        `WIDER` at points that a wider path reaches than the targets.
     """
     parts = np.zeros(len(squared), dtype=np.uint8)
     queue = np.empty(len(squared), dtype=np.int32)
-    after = np.empty(len(squared), dtype=np.int32)  # of waiting points: the next in their list
+    after = np.empty(len(squared), dtype=np.int32)  # the next point in a waiting point's list
     top = math.floor(math.sqrt(_whole(sources[0, 1])))
-    first = np.full(3 * top + 2, -1, dtype=np.int32)  # of the lists, see `_slot`
+    first = np.full(3 * top + 2, -1, dtype=np.int32)  # first points of the lists, see `_slot`
     came, tail, level, answer, wider = 0, 0, 0, 0, 0
     for band in range(top, 0, -1):
         _sort(squared, first, after, band, top)
@@ -89,10 +90,9 @@ def spread(squared: Ints32, width: int, sources: Ints, targets: Ints) -> tuple[i
 def _next_source(
     parts: Bytes, after: Ints32, sources: Ints, came: int, value: int
 ) -> tuple[int, int, int]:
-    """Return a source that a clearance lets in, as a list of its own, its level, and the next.
+    """Return the next source whose clearance rounds up to `value`, its level, and the next index.
 
-    -1 if there is none whose level is above the clearance's predecessor, and which has not been
-    reached from another one.
+    The source is a list of its own; -1 if there is none that was not reached from another source.
     """
     while came < len(sources) and _whole(sources[came, 1]) == value:
         node, key = sources[came, 0], sources[came, 1]
@@ -117,7 +117,7 @@ def _drain(
     band: int,
     top: int,
 ) -> int:
-    """Reach all that is as clear as `least`, from the points in the queue, and return its end."""
+    """Reach all points at least as clear as `least` from those in the queue; return its end."""
     near = ROWS * width + COLS
     while head < tail:
         node = int(queue[head])
@@ -147,7 +147,7 @@ def _sort(squared: Ints32, first: Ints32, after: Ints32, band: int, top: int) ->
 
 @njit(cache=True, nogil=True)
 def _slot(value: int, band: int, top: int) -> int:
-    """Return which list a clearance waits in: bands from 0 on, clearances of the band behind."""
+    """Return the list of a clearance: those of bands come first, then those of one band."""
     if value < band * band:
         return math.floor(math.sqrt(value))
     return top + 1 + value - band * band
@@ -155,13 +155,13 @@ def _slot(value: int, band: int, top: int) -> int:
 
 @njit(cache=True, nogil=True)
 def _whole(key: int) -> int:
-    """Return the least squared clearance of lattice points that is as much as a key's."""
+    """Return a key's squared clearance, rounded up to that of a lattice point."""
     return -(-key // UNIT)
 
 
 @njit(cache=True, nogil=True)
 def _mark(parts: Bytes, queue: Ints32, count: int) -> Bytes:
-    """Mark the first points of the queue as those that a wider way leads to."""
+    """Mark the first points of the queue as reached by a wider path."""
     for i in range(count):
         parts[queue[i]] = WIDER
     return parts
@@ -171,7 +171,14 @@ def _mark(parts: Bytes, queue: Ints32, count: int) -> Bytes:
 def steps_over(squared: Ints32, width: int, least: int) -> Bytes:
     """Return the steps between lattice points that keep a squared clearance, shape (points,).
 
-    A bit each, as in `planners.search.kernels.astar`.
+    Each step is a bit, as in `planners.search.kernels.astar`.
+
+    Parameters
+    ----------
+    squared : ndarray of int32, shape (points,) [(half cells)²]
+    width : int
+        Points in a row.
+    least : int [(half cells)²]
     """
     steps = np.zeros(len(squared), dtype=np.uint8)
     near = ROWS * width + COLS
