@@ -57,9 +57,8 @@ def ticking(monkeypatch: pytest.MonkeyPatch) -> None:
     looks = count()
     for module in ("search.base", "route.solve", "planning"):
         monkeypatch.setattr(f"planners.{module}.now", lambda: TICK * next(looks))
-    monkeypatch.setattr(
-        "planners.sampling.ompl_states.POLL_INTERVAL", math.inf
-    )  # looks by calls, not by time
+    # Polls are scheduled by calls, not by time.
+    monkeypatch.setattr("planners.sampling.ompl_states.POLL_INTERVAL", math.inf)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -88,6 +88,7 @@ class Objective:
     >>> from planners.costmap.costmap import Costmap
     >>> from planners.problem.costs import CostSettings
     >>> from planners.problem.problem import PlanningProblem
+    >>> from planners.sampling.motion_validator2d import MotionValidator2D
     >>> grid = ConfidenceGrid(resolution=0.5)
     >>> field = np.full((64, 64), -1.0, dtype=np.float32)
     >>> field[:32] = -0.5
