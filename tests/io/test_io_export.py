@@ -123,7 +123,7 @@ def test_dense_arrays_are_the_window(tmp_path: Path, origin: tuple[float, ...]) 
 
 @pytest.mark.parametrize("suffix", sorted(EXPORTERS))
 def test_an_empty_map_is_refused_and_nothing_written(tmp_path: Path, suffix: str) -> None:
-    with pytest.raises(InputError, match="grid: expected a map of something, got an empty one"):
+    with pytest.raises(InputError, match="grid: expected a map with known cells, got an empty one"):
         export(ConfidenceGrid(), tmp_path / f"map{suffix}")
     assert list(tmp_path.iterdir()) == []
 

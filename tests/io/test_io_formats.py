@@ -78,7 +78,7 @@ def test_a_path_that_does_not_exist_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_file_instead_of_a_folder_is_refused(folder: Path) -> None:
-    with pytest.raises(FileFormatError, match=r"got a file. Give the folder that holds it."):
+    with pytest.raises(FileFormatError, match=r"got a file. Give the folder that contains it."):
         read_views(folder / "poses.txt")
 
 

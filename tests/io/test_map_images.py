@@ -143,7 +143,7 @@ def test_a_missing_key_is_named(tmp_path: Path, key: str) -> None:
         ({"origin": 3}, r"an origin of \[x, y, yaw\], got '3'"),
         ({"origin": [0, 0]}, r"an origin of \[x, y, yaw\], got \['0', '0'\]"),
         ({"origin": [0, "east", 0]}, "a number for 'origin', got 'east'"),
-        ({"origin": [0, 0, 1.5]}, "an origin of yaw 0, got 1.5. Turn the image"),
+        ({"origin": [0, 0, 1.5]}, "an origin of yaw 0, got 1.5. Rotate the image"),
         ({"negate": 2}, "negate 0 or 1, got '2'"),
         ({"occupied_thresh": 0.1}, "free_thresh <= occupied_thresh <= 1, got 0.196 and 0.1"),
         ({"occupied_thresh": 65}, "free_thresh <= occupied_thresh <= 1, got 0.196 and 65"),
