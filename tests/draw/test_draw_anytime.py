@@ -128,5 +128,5 @@ def test_a_figure_of_nobody_who_found_anything_can_be_drawn() -> None:
 
 
 def test_a_figure_without_panels_is_refused() -> None:
-    with pytest.raises(InputError, match=r"panels: expected one at least, got none"):
+    with pytest.raises(InputError, match=r"panels: expected at least one, got none"):
         anytime_figure([], columns=1)

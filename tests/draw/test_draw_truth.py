@@ -116,7 +116,7 @@ def test_what_the_map_does_not_know_is_missed_where_it_was_in_sight(state: CellS
 @pytest.mark.parametrize("name", ["nonfree", "visible", "behind"])
 def test_a_truth_of_another_shape_is_refused(name: str) -> None:
     other = {**truth(), name: np.zeros((2, 3), dtype=np.bool_)}
-    with pytest.raises(InputError, match=rf"{name}: expected shape \(6, 8\), as the map, got"):
+    with pytest.raises(InputError, match=rf"{name}: expected the shape \(6, 8\) of the map, got"):
         findings(states_of(CellState.FREE), **other)
 
 
