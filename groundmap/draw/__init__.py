@@ -1,8 +1,8 @@
-"""Pictures: the only package that imports matplotlib, and only when something is drawn.
+"""Pictures; the only package that imports matplotlib, on the first call that draws.
 
-Every function draws on `ax`, or on new axes, and returns the artists it made. The four states keep
-apart in greyscale, too: free is the lightest, unknown darker, contested darker still, non-free
-nearly black.
+Every function draws on `ax`, or on new axes, and returns the artists that it created. The four
+states are distinct in greyscale as well: free is the lightest, then unknown, contested, and
+non-free, which is nearly black.
 """
 
 from groundmap.draw.case import draw_case

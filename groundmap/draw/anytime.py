@@ -1,4 +1,4 @@
-"""Anytime planners: how soon each has a route, how good, and how it gets better with time."""
+"""Pictures of anytime planners: time to the first route, cost over time, seeds solved."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Okabe and Ito's colours, told apart by colour-blind people, the yellow darker; and markers.
+# Okabe and Ito's colours, distinct for colour-blind people (with a darker yellow); markers.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#221122")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "h", "p", "d", "*", "8", "H")
 ALL, SOME, NONE = "#dbe9f4", "#fbe3c8", "#f2b8a0"  # seeds that were solved
 RATIOS = (1.0, 1.02, 1.05, 1.1, 1.2, 1.3, 1.5, 1.7, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0)
-FEW = 5  # ratios at the ticks of a panel, at most
-PANEL, LINE = (3.3, 2.5), 0.21  # [inch] of a panel; of a line of the table
+FEW = 5  # most ratios at the ticks of a panel
+PANEL, LINE = (3.3, 2.5), 0.21  # [inch]: size of a panel; height of a row of the table
 
 
 class Progress(NamedTuple):
-    """How one planner did.
+    """The results of one planner.
 
     Attributes
     ----------
     points : sequence or ndarray, shape (n, 2)
-        Seconds, rising, and the ratio of the cost to the optimum; the last is the route that was
-        handed out. One: a planner that doesn't better its route. None: no route.
+        Seconds, ascending, and the ratio of the cost to the optimum. The last row is the returned
+        route. Planners that do not improve their route have one row; no route: no row.
     solved, asked : int
-        Seeds.
+        Number of seeds solved, and in total.
     """
 
     points: Sequence[Sequence[float]] | Floats
@@ -42,25 +42,25 @@ class Progress(NamedTuple):
 
 
 class Style(NamedTuple):
-    """How a planner is drawn."""
+    """Colour and marker of a planner."""
 
     color: str
     marker: str
-    lined: bool  #: whether it betters its routes
+    lined: bool  #: whether it improves its routes
 
 
 class Panel(NamedTuple):
-    """Planners on one workload in one space, by name."""
+    """Results of planners, by name, on one workload in one space."""
 
     title: str
     progress: Mapping[str, Progress]
-    note: str = ""  #: what the ratio is to
+    note: str = ""  #: the reference of the ratio
 
 
 def styles(panels: Sequence[Panel]) -> dict[str, Style]:
-    """Return a style for each planner: first those that better their routes, by name.
+    """Return a style for each planner: first those that improve their routes, by name.
 
-    Their colours differ, as far as there are colours; no two planners share colour and marker.
+    Colours differ while there are enough of them; no two planners share both colour and marker.
 
     Examples
     --------
@@ -84,10 +84,10 @@ def styles(panels: Sequence[Panel]) -> dict[str, Style]:
 def draw_anytime(
     progress: Mapping[str, Progress], *, style: Mapping[str, Style], ax: Axes
 ) -> list[Artist]:
-    """Draw cost over time: a line for each planner that betters its route, else a marker.
+    """Draw cost over time: a line for each planner that improves its route, else a marker.
 
-    A line ends in the marker of its planner, where the route was handed out. A hollow marker
-    says that not every seed was solved.
+    A line ends in the marker of its planner, at the returned route. A hollow marker means that not
+    every seed was solved.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def draw_anytime(
 
 
 def draw_success(panels: Sequence[Panel], *, style: Mapping[str, Style], ax: Axes) -> list[Artist]:
-    """Draw a table of how many seeds were solved: a row for each planner, with its marker.
+    """Draw a table of the numbers of solved seeds: a row for each planner, with its marker.
 
     Parameters
     ----------
@@ -141,10 +141,10 @@ def draw_success(panels: Sequence[Panel], *, style: Mapping[str, Style], ax: Axe
         artists.append(ax.text(-1.7, row, name, va="center", fontsize=8.5))
         for column, panel in enumerate(panels):
             done = panel.progress.get(name)
-            shade, said = ("white", "-") if done is None else (_shade(done), f"{done.solved}")
+            shade, entry = ("white", "-") if done is None else (_shade(done), f"{done.solved}")
             box = Rectangle((column - 0.5, row - 0.5), 1, 1, facecolor=shade, edgecolor="white")
             artists.append(ax.add_patch(box))
-            artists.append(ax.text(column, row, said, ha="center", va="center", fontsize=8.5))
+            artists.append(ax.text(column, row, entry, ha="center", va="center", fontsize=8.5))
     for column, panel in enumerate(panels):
         title = panel.title.replace(", ", "\n")
         artists.append(ax.text(column, -0.7, title, ha="center", va="bottom", fontsize=8))
@@ -155,7 +155,7 @@ def draw_success(panels: Sequence[Panel], *, style: Mapping[str, Style], ax: Axe
 
 
 def anytime_figure(panels: Sequence[Panel], *, columns: int) -> Figure:
-    """Return a figure of all panels, and below them who solved how many seeds.
+    """Return a figure of all panels, with the table of solved seeds below them.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def anytime_figure(panels: Sequence[Panel], *, columns: int) -> Figure:
     from matplotlib.figure import Figure
 
     if not panels:
-        raise InputError("panels", "one at least", "none")
+        raise InputError("panels", "at least one", "none")
     style = styles(panels)
     rows = -(-len(panels) // columns)
     heights = [rows * PANEL[1], (len(style) + 3.5) * LINE]
@@ -208,7 +208,7 @@ def _shade(done: Progress) -> str:
 
 
 def _axes_of(ax: Axes, highest: float) -> None:
-    """Make both axes logarithmic, the ratios' from just below 1, with few round ticks."""
+    """Make both axes logarithmic; that of the ratios starts just below 1 and has few ticks."""
     top = max(1.05, highest**1.08)
     ax.set_xscale("log")
     ax.set_yscale("log")
@@ -227,7 +227,7 @@ def _axes_of(ax: Axes, highest: float) -> None:
 
 
 def _same_times(axes: Iterable[Axes]) -> None:
-    """Let all panels span the same times."""
+    """Set the same range of times on all panels."""
     every = list(axes)
     times = np.concatenate([line.get_xdata() for ax in every for line in ax.lines[:-1]] or [[1.0]])
     low, high = float(np.min(times)), float(np.max(times))

@@ -1,4 +1,4 @@
-"""The picture of one case: the world as it is, the map with its routes, the two compared."""
+"""The picture of one case: the true world, the map with its routes, and their difference."""
 
 from __future__ import annotations
 
@@ -24,10 +24,14 @@ if TYPE_CHECKING:
 FoundRoute: TypeAlias = tuple[str, npt.ArrayLike, float]  # label, waypoints [m], footprint [m]
 FailedQuery: TypeAlias = tuple[str, npt.ArrayLike, npt.ArrayLike]  # label, start, goal [m]
 
-WIDE = 2.0  # maps this many times as wide as tall have their panels one below the other
-ROW, STACK, LONGEST = 4.0, 10.8, 8.5  # [inch], a panel's width in a row, in a stack; its height
+WIDE = 2.0  # ratio of width to height from which on panels are stacked
+ROW, STACK, LONGEST = (
+    4.0,
+    10.8,
+    8.5,
+)  # [inch]: width of a panel in a row, in a stack; largest height
 NARROWEST = 2.9  # [inch], of a panel: room for its legend
-LEGEND_COLUMN, LEGEND_DROP = 1.5, 0.45  # [inch], wide; below the axes, past the ticks and x [m]
+LEGEND_COLUMN, LEGEND_DROP = 1.5, 0.45  # [inch]: width; distance below the axes and their label
 
 
 def draw_case(
@@ -43,7 +47,7 @@ def draw_case(
     trajectory: npt.ArrayLike = (),
     title: str = "",
 ) -> Figure:
-    """Draw the truth, the map and the difference of the two; below each other if they are wide.
+    """Draw the truth, the map and their difference; stacked if they are wide.
 
     Parameters
     ----------
@@ -51,7 +55,7 @@ def draw_case(
     outline : shapely.Geometry [m, map]
         True obstacles.
     nonfree, visible, behind : ndarray of bool, shape (rows, cols)
-        The truth in the cells of `window`, as for `findings`.
+        The truth on the cells of `window`, as for `draw_difference`.
     window : GridWindow
         The part of the grid to show.
     routes : sequence of (str, array_like of shape (n, 2) [m, map], float [m])
@@ -70,7 +74,7 @@ def draw_case(
     draw_truth(outline, visible=visible, **place, ax=truth)
     bounds = np.array([*truth.get_xlim(), *truth.get_ylim()])[[0, 2, 1, 3]]
     for scale in draw_grid(grid, bounds=bounds, ax=mapped)[1:3]:
-        scale.remove()  # the ticks say it already
+        scale.remove()  # the ticks show the scale
     draw_difference(
         window.states(), nonfree=nonfree, visible=visible, behind=behind, **place, ax=difference
     )
@@ -84,7 +88,7 @@ def draw_case(
 
 
 def _panels(width: float, height: float) -> tuple[Figure, list[Axes]]:
-    """Return a figure with three panels for maps of that size [m]."""
+    """Return a figure with three panels for maps of a given size [m]."""
     from matplotlib.figure import Figure
 
     stacked = width > WIDE * height
@@ -104,13 +108,13 @@ def _panels(width: float, height: float) -> tuple[Figure, list[Axes]]:
 
 
 def _draw_queries(routes: Sequence[FoundRoute], failed: Sequence[FailedQuery], *, ax: Axes) -> None:
-    """Draw routes, and a plus and a cross where one was asked for in vain."""
+    """Draw routes; a plus and a cross at start and goal of queries without a route."""
     for number, (label, waypoints, footprint) in enumerate(routes, start=1):
         draw_route(waypoints, footprint=footprint, ax=ax)
         line = shapely.LineString(
             np.repeat(as_floats("waypoints", waypoints, (None, 2)), 2, axis=0)
         )
-        # Routes between the same two places have their labels at different shares of the way.
+        # Labels of routes between the same two places are at different fractions of their length.
         middle = line.interpolate(number / (len(routes) + 1), normalized=True)
         _write(label, (middle.x, middle.y), ax=ax)
     for label, start, goal in failed:
@@ -128,7 +132,7 @@ def _draw_queries(routes: Sequence[FoundRoute], failed: Sequence[FailedQuery], *
 
 
 def _write(label: str, place: npt.ArrayLike, *, ax: Axes) -> None:
-    """Write a label beside a place [m], readable on any ground."""
+    """Write a label beside a place [m], readable on any background."""
     from matplotlib.patheffects import withStroke
 
     x, y = as_floats("place", place, (2,))
@@ -138,7 +142,7 @@ def _write(label: str, place: npt.ArrayLike, *, ax: Axes) -> None:
 
 
 def _legend_below(ax: Axes) -> None:
-    """Move the legend below the axes, each label once, in as many columns as there is room for."""
+    """Move the legend below the axes: each label once, in as many columns as fit."""
     from matplotlib.transforms import ScaledTranslation
 
     figure: Any = ax.figure

@@ -1,4 +1,4 @@
-"""Curves: what single views show, by the number of their features."""
+"""Curves of the free space that single views find, over their number of features."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-# Apart in greyscale, too: by marker and by dashes.
+# Distinct in greyscale, too, by marker and dashes.
 STYLES = (("#1f5f8b", "o", "-"), ("#221122", "s", "-"), ("#d08030", "^", "--"))
 RECALL, FALSE = "truly free and in sight: free on the map", "free on the map: wrong by over 0.3 m"
 MOST_FEATURES = 1e12
-NEAREST = 0.13  # of a decade: ticks nearer than that to the one before have no room
+NEAREST = 0.13  # of a decade: least distance between two ticks
 
 
 def draw_curves(curves: Mapping[str, npt.ArrayLike], *, ax: Sequence[Axes]) -> list[Artist]:
-    """Draw which share of freespace is found, and which share of what is found is false.
+    """Draw the share of free space found, and the share of found free space that is false.
 
     Parameters
     ----------
     curves : mapping of str to array_like, shape (3, n)
-        By the name to show: numbers of features, share of freespace found, share of it false.
-    ax : two matplotlib axes
+        By label: numbers of features, share of free space found, share of it that is false.
+    ax : sequence of two matplotlib Axes
 
     Raises
     ------
     InputError
-        Arrays of another shape, numbers of features below 1 or shares beyond [0, 1].
+        Arrays of another shape, numbers of features below 1, or shares outside [0, 1].
     """
     lines: list[Artist] = []
     values = {name: as_floats(name, rows, (3, None)) for name, rows in curves.items()}
@@ -63,7 +63,7 @@ def draw_curves(curves: Mapping[str, npt.ArrayLike], *, ax: Sequence[Axes]) -> l
 
 
 def _count_axis(ax: Axes, counts: npt.NDArray[np.float64]) -> None:
-    """Make x logarithmic, with the counts themselves at the ticks that there is room for."""
+    """Make x logarithmic, with ticks at those counts that fit."""
     ticks: list[float] = []
     for count in counts.tolist():
         if not ticks or np.log10(count / ticks[-1]) >= NEAREST:
@@ -76,7 +76,15 @@ def _count_axis(ax: Axes, counts: npt.NDArray[np.float64]) -> None:
 
 
 def curves_png(curves: Mapping[str, npt.ArrayLike], *, dpi: int = 100) -> bytes:
-    """Return a PNG of `draw_curves` on two axes side by side."""
+    """Return the bytes of a PNG file of `draw_curves` on two axes side by side.
+
+    Parameters
+    ----------
+    curves : mapping of str to array_like, shape (3, n)
+        As for `draw_curves`.
+    dpi : int, default 100
+        Resolution [pixels per inch].
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 4.4), layout="constrained")

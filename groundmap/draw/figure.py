@@ -1,4 +1,4 @@
-"""Figures, scale bars, legends: what every picture has."""
+"""Figures, scale bars and legends, which all pictures share."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 PICTURE_FORMATS = (".png", ".pdf", ".svg")
 SMALLEST_BOX, LARGEST_BOX = 1e-3, 1e12  # [m]
-FINEST = 1e-9  # least side of a box, as a share of its coordinates: axes can't label less
+FINEST = 1e-9  # least side of a box relative to its coordinates: axis labels need it
 LONG_SIDE = 11.0  # [inch]
 
 
 def new_figure(bounds: npt.ArrayLike) -> tuple[Figure, Axes]:
-    """Return a figure shaped like a box of the map, without a window on any screen.
+    """Return a figure with the aspect ratio of a box of the map; it opens no window.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def new_figure(bounds: npt.ArrayLike) -> tuple[Figure, Axes]:
     Raises
     ------
     InputError
-        Bounds that are not finite, or hold nothing.
+        Bounds that are not finite, or an empty box.
     """
     from matplotlib.figure import Figure
 
@@ -49,7 +49,7 @@ def new_figure(bounds: npt.ArrayLike) -> tuple[Figure, Axes]:
         raise InputError("bounds", "XMIN < XMAX and YMIN < YMAX [m]", str(box.tolist()))
     largest = max(float(np.abs(box).max()), SMALLEST_BOX)
     if min(width, height) < FINEST * largest or largest > LARGEST_BOX:
-        expected = f"a box within {LARGEST_BOX:g} m, of which coordinates tell the sides apart"
+        expected = f"a box within {LARGEST_BOX:g} m, with sides above {FINEST:g} of its coordinates"
         raise InputError("bounds", expected, str(box.tolist()))
     scale = LONG_SIDE / max(width, height)
     figure = Figure(
@@ -68,10 +68,17 @@ def new_figure(bounds: npt.ArrayLike) -> tuple[Figure, Axes]:
 def save_figure(figure: Figure, path: str | PathLike[str], *, dpi: int = 130) -> None:
     """Write a figure to a .png, .pdf or .svg file, atomically.
 
+    Parameters
+    ----------
+    figure : matplotlib Figure
+    path : path
+    dpi : int, default 130
+        Resolution of raster images [pixels per inch].
+
     Raises
     ------
     InputError
-        Another kind of file.
+        Another suffix.
     """
     check_picture(path)
     suffix = Path(path).suffix.lower()
@@ -79,7 +86,14 @@ def save_figure(figure: Figure, path: str | PathLike[str], *, dpi: int = 130) ->
 
 
 def figure_png(figure: Figure, dpi: int = 110) -> bytes:
-    """Return a figure as the bytes of a PNG file."""
+    """Return the bytes of a PNG file of a figure.
+
+    Parameters
+    ----------
+    figure : matplotlib Figure
+    dpi : int, default 110
+        Resolution [pixels per inch].
+    """
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=dpi)
     return stream.getvalue()
@@ -88,15 +102,20 @@ def figure_png(figure: Figure, dpi: int = 110) -> bytes:
 def check_picture(
     path: str | PathLike[str], *, sources: Iterable[str | PathLike[str]] = ()
 ) -> None:
-    """Check that a picture can be written there, before the work that it is to show.
+    """Check that a picture can be written to a path, before the work that it will show.
+
+    Parameters
+    ----------
+    path : path
+    sources : iterable of path
+        Files that the work reads, which the picture must not replace.
 
     Raises
     ------
     InputError
-        Another suffix than .png, .pdf or .svg.
+        A suffix other than .png, .pdf and .svg.
     FileFormatError
-        The folder does not exist, or the path is a folder itself, or one of the files `sources`
-        that the work reads.
+        The folder does not exist, or the path is a folder or one of `sources`.
     """
     if Path(path).suffix.lower() not in PICTURE_FORMATS:
         raise InputError("plot", f"a file name ending in {', '.join(PICTURE_FORMATS)}", str(path))
@@ -104,12 +123,12 @@ def check_picture(
 
 
 def scale_bar(ax: Axes) -> list[Artist]:
-    """Draw a bar of a round number of metres, about a sixth of the picture wide."""
+    """Draw a bar of a round number of metres, about a sixth of the axes wide."""
     xmin, xmax = ax.get_xlim()
     target = (xmax - xmin) / 6.0
     power = 10.0 ** np.floor(np.log10(target))
     length = max(step * power for step in (1.0, 2.0, 5.0) if step * power <= target)
-    transform = ax.get_xaxis_transform()  # x in metres, y as a share of the picture
+    transform = ax.get_xaxis_transform()  # x in metres, y as a share of the axes
     left = xmin + 0.03 * (xmax - xmin)
     bar: Any = ax.plot(
         [left, left + length], [0.05, 0.05], color="0.1", linewidth=3.0,
@@ -123,11 +142,18 @@ def scale_bar(ax: Axes) -> list[Artist]:
 
 
 def add_to_legend(ax: Axes, handles: list[Any]) -> Artist:
-    """Add to the legend above the picture, keeping what it holds."""
-    before = ax.get_legend()
-    held = [] if before is None else list(before.legend_handles)
+    """Add handles to the legend above the axes, beside those it contains.
+
+    Parameters
+    ----------
+    ax : matplotlib Axes
+    handles : list of matplotlib Artist
+        With labels.
+    """
+    legend = ax.get_legend()
+    present = [] if legend is None else list(legend.legend_handles)
     return ax.legend(
-        handles=[*(handle for handle in held if handle is not None), *handles],
+        handles=[*(handle for handle in present if handle is not None), *handles],
         loc="lower left",
         bbox_to_anchor=(0.0, 1.01),
         ncols=6,

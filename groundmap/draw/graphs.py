@@ -1,4 +1,4 @@
-"""Pictures of the trees and roadmaps that sampling planners grow, given as plain arrays."""
+"""Pictures of the trees and roadmaps of sampling planners, given as arrays."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 GRAPH = "#00695c"
-MANY = 5000  # edges from which on they are thinner, and pixels in .pdf and .svg files, too
+MANY = 5000  # number of edges from which on they are thinner, and rasterised in .pdf and .svg files
 
 
 def draw_graph(
     vertices: npt.ArrayLike, edges: npt.ArrayLike, *, ax: Axes, label: str = "graph"
 ) -> list[Artist]:
-    """Draw the edges of a tree or a roadmap, under routes and above the map.
+    """Draw the edges of a tree or a roadmap, above the map and below routes.
 
-    Edges are drawn as straight lines; those of spaces in which robots drive curves aren't.
+    Edges are drawn as straight lines, although they are curves in spaces of curves.
 
     Parameters
     ----------
     vertices : array_like, shape (n, 2) or (n, 3) [m, map]
-        Only x and y are looked at.
+        Only x and y are used.
     edges : array_like of int, shape (m, 2)
-        Indices of the vertices that an edge joins.
+        Indices of the vertices of each edge.
     ax : matplotlib Axes
     label : str, default "graph"
         Name in the legend.
@@ -39,7 +39,7 @@ def draw_graph(
     Raises
     ------
     InputError
-        Other shapes, or an edge of a vertex that there is not.
+        Other shapes, or an edge of a nonexistent vertex.
     """
     from matplotlib.collections import LineCollection
     from matplotlib.lines import Line2D

@@ -1,4 +1,4 @@
-"""Pictures of grids: the four states, where they were seen from, held-out features on them."""
+"""Pictures of grids: the four states, the trajectory of the camera, held-out features."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-# Each state from its faintest to its surest confidence, RGB.
+# RGB of each state at its lowest and highest confidence.
 SHADES: dict[CellState, tuple[tuple[float, float, float], tuple[float, float, float]]] = {
     CellState.UNKNOWN: ((0.80, 0.80, 0.79), (0.80, 0.80, 0.79)),
     CellState.FREE: ((0.90, 0.94, 0.97), (0.98, 0.99, 1.00)),
@@ -30,28 +30,34 @@ LABELS = {
     CellState.CONTESTED: "contested",
     CellState.UNKNOWN: "unknown",
 }
-MOST_DRAWN = 2**25  # cells of a picture, about 50 bytes each: more than any screen shows
+MOST_DRAWN = 2**25  # cells of a picture, of about 50 bytes each; no screen shows more
 TRAJECTORY = "#1f5f8b"
 
 
 def known_bounds(grid: ConfidenceGrid, *, margin: float = 1.0) -> Floats:
-    """Return the box around all cells that were spoken of, shape (4,) [m, map].
+    """Return the box around all observed cells, shape (4,) [m, map].
+
+    Parameters
+    ----------
+    grid : ConfidenceGrid
+    margin : float, default 1 [m]
+        Added on each side.
 
     Raises
     ------
     InputError
-        The grid is empty, or its tiles lie so far apart that no picture can show them all.
+        The grid is empty, or its tiles lie too far apart for one picture.
     """
     grid.check_extent(MOST_DRAWN)
-    # Tile by tile: a dense window would take the memory of the bounding box.
-    spoken = (
+    # Tile by tile, since a dense window would need memory for the whole bounding box.
+    observed = (
         np.array(index) * grid.tile_shape + np.argwhere(tile.count) for index, tile in grid.tiles()
     )
-    boxes = [(cells.min(axis=0), cells.max(axis=0) + 1) for cells in spoken if len(cells)]
+    boxes = [(cells.min(axis=0), cells.max(axis=0) + 1) for cells in observed if len(cells)]
     if not boxes:
         raise InputError("grid", "at least one known cell", "an empty map")
     lowest, highest = np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]
-    # From the corner of the first tile, as the window around all tiles has it.
+    # From the corner of the first tile, with the rounding of a window around all tiles.
     first = grid.cell_bounds()[0]
     corner = grid.origin + first[::-1] * grid.resolution
     low = corner + (lowest - first)[::-1] * grid.resolution
@@ -72,15 +78,16 @@ def draw_grid(
     ----------
     grid : ConfidenceGrid
     bounds : array_like, shape (4,), optional
-        xmin, ymin, xmax, ymax [m, map]; all that is known unless told.
+        xmin, ymin, xmax, ymax [m, map]; default: all observed cells.
     epsilon : float
         Confidence below which a cell is contested.
-    ax : matplotlib axes, optional
+    ax : matplotlib Axes, optional
+        Default: new axes.
 
     Raises
     ------
     InputError
-        Bounds that are no box, or hold more than 2**25 cells.
+        Invalid bounds, or bounds with more than 2**25 cells.
     """
     from matplotlib.patches import Patch
 
@@ -107,12 +114,13 @@ def draw_grid(
 
 
 def draw_trajectory(poses: npt.ArrayLike, *, ax: Axes) -> list[Artist]:
-    """Draw where the views were taken: a dashed line from a dot, arrows the way they looked.
+    """Draw the poses of views: a dashed line from a dot, with arrows in viewing direction.
 
     Parameters
     ----------
     poses : array_like, shape (n, 3)
         x, y [m, map] and yaw [rad].
+    ax : matplotlib Axes
     """
     rows = as_floats("poses", poses, (None, 3))
     check_finite("poses", rows)
@@ -134,14 +142,15 @@ def draw_trajectory(poses: npt.ArrayLike, *, ax: Axes) -> list[Artist]:
 def draw_verdicts(
     grid: ConfidenceGrid, *, obstacles: npt.ArrayLike, grounds: npt.ArrayLike, ax: Axes
 ) -> list[Artist]:
-    """Draw held-out features by what the map says of them: triangles obstacles, dots ground.
+    """Draw held-out features by the state of their cells: obstacles as triangles, ground as dots.
 
-    Green where the map agrees, red where it contradicts, yellow where it does not know.
+    Green: the map agrees; red: the map contradicts; yellow: the cell is unknown or contested.
 
     Parameters
     ----------
     grid : ConfidenceGrid
     obstacles, grounds : array_like, shape (n, 2) [m, map]
+    ax : matplotlib Axes
     """
     window = grid.window()
     states = window.states()
@@ -153,12 +162,12 @@ def draw_verdicts(
         places = as_floats(name, points, (None, 2))
         cells = window.world_to_cell(places) if len(places) else np.empty((0, 2), dtype=np.int64)
         inside = window.contains(cells)
-        found = np.full(len(places), CellState.UNKNOWN, dtype=np.uint8)
-        found[inside] = states[tuple(cells[inside].T)]
-        known = (found == CellState.FREE) | (found == CellState.NONFREE)
+        at = np.full(len(places), CellState.UNKNOWN, dtype=np.uint8)
+        at[inside] = states[tuple(cells[inside].T)]
+        known = (at == CellState.FREE) | (at == CellState.NONFREE)
         for label, color, mask in (
-            (f"{name}: agrees", "#2e9e5b", known & (found == right)),
-            (f"{name}: contradicts", "#d62728", known & (found != right)),
+            (f"{name}: agrees", "#2e9e5b", known & (at == right)),
+            (f"{name}: contradicts", "#d62728", known & (at != right)),
             (f"{name}: unknown", "#e6b800", ~known),
         ):
             artist = ax.plot(*places[mask].T, marker, color=color, markersize=3.2, zorder=5)[0]
@@ -170,9 +179,9 @@ def draw_verdicts(
 
 def _shade(window: GridWindow, epsilon: float) -> Floats:
     states = window.states(epsilon=epsilon)
-    sure = np.abs(window.confidence).astype(np.float64)[..., None]
+    certainty = np.abs(window.confidence).astype(np.float64)[..., None]
     image = np.zeros((*states.shape, 3))
     for state, (faint, full) in SHADES.items():
         mask = states == state
-        image[mask] = np.array(faint) + (np.array(full) - np.array(faint)) * sure[mask]
+        image[mask] = np.array(faint) + (np.array(full) - np.array(faint)) * certainty[mask]
     return image

@@ -1,4 +1,4 @@
-"""Pictures of routes, given as plain arrays."""
+"""Pictures of routes, given as arrays."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 ROUTE, FOOTPRINT = "#c2185b", "#f06292"
 MOST_STAMPS = 1000
-STAMPS = 8.0  # [m] of route between two outlines of the footprint
-# Told apart by colour and by dash, however many there are and whoever looks.
+STAMPS = 8.0  # [m] along a route between two outlines of the footprint
+# Routes differ by colour and by dashes.
 COLOURS = ("#c2185b", "#1565c0", "#ef6c00", "#2e7d32", "#6a1b9a", "#00838f", "#5d4037", "#37474f")
 DASHES = ("-", (0, (5, 2)), (0, (1, 1.5)))
 
@@ -58,7 +58,7 @@ def draw_route(
 def draw_routes(routes: Mapping[str, npt.ArrayLike], *, ax: Axes) -> list[Artist]:
     """Draw several routes between the same places, with their names in the legend.
 
-    Routes that are the same to the last bit are one line, with all their names.
+    Identical routes are drawn as one line with all their names.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def draw_routes(routes: Mapping[str, npt.ArrayLike], *, ax: Axes) -> list[Artist
     artists: list[Artist] = []
     for number, (names, points) in enumerate(lines):
         line = ax.plot(*points.T, zorder=5, label=", ".join(names))[0]
-        # The later, the thinner: what runs along another line still shows.
+        # Later lines are thinner, so that lines below them remain visible.
         line.set(
             color=COLOURS[number % len(COLOURS)],
             linestyle=DASHES[number // len(COLOURS) % len(DASHES)],
@@ -96,7 +96,7 @@ def _draw_ends(points: Floats, ax: Axes) -> Artist:
 def _footprints(
     points: Floats, footprint: float | npt.ArrayLike, headings: npt.ArrayLike | None
 ) -> list[Patch]:
-    """Return the swept band first, and outlines of the footprint now and then."""
+    """Return the swept area, then outlines of the footprint at intervals."""
     from matplotlib.patches import Circle, Polygon
 
     outlines: list[Patch] = []
@@ -139,19 +139,19 @@ def _place(corners: Floats, points: Floats, headings: npt.ArrayLike | None) -> F
 
 
 def _select_stamps(points: Floats) -> list[int]:
-    """Return the waypoints at which an outline is drawn."""
+    """Return the indices of the waypoints at which an outline is drawn."""
     along = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
-    wanted = np.linspace(0.0, along[-1], _stamps(float(along[-1])))
-    return [int(k) for k in np.unique(np.searchsorted(along, wanted).clip(max=len(points) - 1))]
+    stops = np.linspace(0.0, along[-1], _stamps(float(along[-1])))
+    return [int(k) for k in np.unique(np.searchsorted(along, stops).clip(max=len(points) - 1))]
 
 
 def _stamps(length: float) -> int:
-    """Return how many outlines of the footprint are drawn along a route of that length [m]."""
+    """Return the number of outlines of the footprint along a route of a given length [m]."""
     return 2 if length < STAMPS else min(int(length / STAMPS) + 1, MOST_STAMPS)
 
 
 def _points(name: str, values: npt.ArrayLike, *, least: int = 1) -> Floats:
-    """Return points, shape (n, 2) [m]: at least so many, all finite and no farther than a map."""
+    """Return points, shape (n, 2) [m]: at least `least`, finite, and within `LARGEST_BOX`."""
     points = as_floats(name, values, (None, 2))
     check_finite(name, points)
     if len(points) < least:

@@ -1,4 +1,4 @@
-"""Pictures of a map beside the truth: the world as it is, the map, and where the two differ."""
+"""Pictures of the true world, and of the differences of a map from it."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ if TYPE_CHECKING:
 
 
 class Finding(IntEnum):
-    """What the truth says of a cell of the map, from harmless to dangerous."""
+    """The result of comparing a cell of the map with the truth, from harmless to dangerous."""
 
-    UNSEEN = 0  #: the map does not know it, and it was not in sight
-    FREE = 1  #: free, and it is
-    NONFREE = 2  #: non-free, and it is, or a cell beside it
-    MISSED = 3  #: ground in plain sight that the map does not know
-    FALSE_NONFREE = 4  #: non-free, but nothing is there or beside it
-    FALSE_FREE = 5  #: free, but non-free in truth, or behind a surface
+    UNSEEN = 0  #: unknown on the map, and not in sight
+    FREE = 1  #: free on the map and in truth
+    NONFREE = 2  #: non-free on the map and in truth, there or beside it
+    MISSED = 3  #: ground in sight that is unknown on the map
+    FALSE_NONFREE = 4  #: non-free on the map, without an obstacle there or beside it
+    FALSE_FREE = 5  #: free on the map, but non-free in truth or behind a surface
 
 
-# Label and colour: the worse, the darker; what is right is the lightest or nearly black.
+# Label and colour: worse findings are darker; right ones are the lightest or nearly black.
 FINDINGS: dict[Finding, tuple[str, tuple[float, float, float]]] = {
     Finding.FREE: ("free, right", SHADES[CellState.FREE][1]),
     Finding.NONFREE: ("non-free, right", SHADES[CellState.NONFREE][1]),
@@ -57,11 +57,11 @@ def findings(states: Bytes, *, nonfree: Bools, visible: Bools, behind: Bools) ->
     states : ndarray of uint8, shape (rows, cols)
         `CellState` of the map's cells.
     nonfree : ndarray of bool, shape (rows, cols)
-        Where an obstacle truly is.
+        Cells with an obstacle in truth.
     visible : ndarray of bool, shape (rows, cols)
         Ground that was truly in sight.
     behind : ndarray of bool, shape (rows, cols)
-        What a surface hides.
+        Cells that a surface hides.
 
     Raises
     ------
@@ -72,22 +72,22 @@ def findings(states: Bytes, *, nonfree: Bools, visible: Bools, behind: Bools) ->
     --------
     >>> states = np.array([[CellState.FREE, CellState.FREE, CellState.UNKNOWN]])
     >>> wall, seen = np.array([[False, True, False]]), np.array([[True, False, False]])
-    >>> found = findings(states, nonfree=wall, visible=seen, behind=~seen)
-    >>> [Finding(cell).name for cell in found[0]]
+    >>> compared = findings(states, nonfree=wall, visible=seen, behind=~seen)
+    >>> [Finding(cell).name for cell in compared[0]]
     ['FREE', 'FALSE_FREE', 'UNSEEN']
     """
     for name, cells in (("nonfree", nonfree), ("visible", visible), ("behind", behind)):
         if cells.shape != states.shape:
-            raise InputError(name, f"shape {states.shape}, as the map", f"shape {cells.shape}")
+            raise InputError(name, f"the shape {states.shape} of the map", f"shape {cells.shape}")
     free, occupied = states == CellState.FREE, states == CellState.NONFREE
     beside = ndimage.binary_dilation(nonfree, structure=np.ones((3, 3), dtype=np.bool_))
-    found = np.full(states.shape, Finding.UNSEEN, dtype=np.uint8)
-    found[visible] = Finding.MISSED
-    found[free] = Finding.FREE
-    found[free & (nonfree | behind)] = Finding.FALSE_FREE
-    found[occupied] = Finding.FALSE_NONFREE
-    found[occupied & beside] = Finding.NONFREE
-    return found
+    compared = np.full(states.shape, Finding.UNSEEN, dtype=np.uint8)
+    compared[visible] = Finding.MISSED
+    compared[free] = Finding.FREE
+    compared[free & (nonfree | behind)] = Finding.FALSE_FREE
+    compared[occupied] = Finding.FALSE_NONFREE
+    compared[occupied & beside] = Finding.NONFREE
+    return compared
 
 
 def draw_truth(
@@ -98,18 +98,18 @@ def draw_truth(
     resolution: float,
     ax: Axes,
 ) -> list[Artist]:
-    """Draw the world as it is: obstacles, and the ground that was in sight.
+    """Draw the true world: obstacles, and the ground that was in sight.
 
     Parameters
     ----------
     outline : shapely.Geometry [m, map]
-        Polygons, holes allowed, or nothing.
+        Polygons, which may have holes; may be empty.
     visible : ndarray of bool, shape (rows, cols)
         Ground that was truly in sight.
     origin : array_like, shape (2,) [m, map]
         Outer corner of cell (0, 0).
     resolution : float [m]
-    ax : matplotlib axes
+    ax : matplotlib Axes
     """
     from matplotlib.patches import PathPatch
 
@@ -132,9 +132,9 @@ def draw_difference(
     resolution: float,
     ax: Axes,
 ) -> list[Artist]:
-    """Draw the `Finding` of every cell, and how many there are of each in the legend.
+    """Draw the `Finding` of every cell; the legend states the number of each.
 
-    False free cells are dots as well, so that no scale makes them vanish.
+    False free cells are marked with dots as well, so that they are visible at any scale.
 
     Parameters
     ----------
@@ -143,30 +143,30 @@ def draw_difference(
     origin : array_like, shape (2,) [m, map]
         Outer corner of cell (0, 0).
     resolution : float [m]
-    ax : matplotlib axes
+    ax : matplotlib Axes
     """
-    found = findings(states, nonfree=nonfree, visible=visible, behind=behind)
+    compared = findings(states, nonfree=nonfree, visible=visible, behind=behind)
     palette = np.array([FINDINGS[finding][1] for finding in Finding])
-    picture = _paint(palette[found], origin, resolution, ax)
-    rows, cols = np.nonzero(found == Finding.FALSE_FREE)
+    picture = _paint(palette[compared], origin, resolution, ax)
+    rows, cols = np.nonzero(compared == Finding.FALSE_FREE)
     x, y = as_floats("origin", origin, (2,))
     (dots,) = ax.plot(
         x + (cols + 0.5) * resolution, y + (rows + 0.5) * resolution, "s",
         color=FINDINGS[Finding.FALSE_FREE][1], markersize=2.4, markeredgewidth=0.0, zorder=1,
     )  # fmt: skip
     names = {
-        f"{label}: {np.count_nonzero(found == finding)}": color
+        f"{label}: {np.count_nonzero(compared == finding)}": color
         for finding, (label, color) in FINDINGS.items()
     }
     return [picture, dots, _name_colors(names, ax=ax)]
 
 
 def _paint(image: Floats, origin: npt.ArrayLike, resolution: float, ax: Axes) -> Artist:
-    """Show a colour per cell, and nothing but these cells."""
+    """Draw a colour per cell, and limit the axes to these cells."""
     rows, cols = image.shape[:2]
     x, y = as_floats("origin", origin, (2,))
     extent = (x, x + cols * resolution, y, y + rows * resolution)
-    # Antialiased only where cells are smaller than a few pixels: a thin wall pales, but stays.
+    # Antialiased only if cells are smaller than a few pixels: thin walls fade but remain visible.
     picture = ax.imshow(image, origin="lower", extent=extent, interpolation="antialiased", zorder=0)
     ax.set_xlim(extent[:2])
     ax.set_ylim(extent[2:])
@@ -186,7 +186,7 @@ def _name_colors(colors: Mapping[str, tuple[float, float, float]], *, ax: Axes) 
 
 
 def _path_of(outline: shapely.Geometry) -> Path:
-    """Return the rings of polygons as one path: holes turn the other way, so they stay empty."""
+    """Return the rings of polygons as one path; holes run clockwise, so they are not filled."""
     from matplotlib.path import Path
 
     polygons = [orient(part) for part in shapely.get_parts(outline) if part.area > 0]

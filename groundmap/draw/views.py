@@ -1,4 +1,4 @@
-"""One view taken apart, by which the method is understood and debugged."""
+"""Pictures of the processing steps of one view."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ def draw_view(parts: ViewParts, grid: ConfidenceGrid, *, title: str = "") -> Fig
     Parameters
     ----------
     parts : ViewParts
-        From `groundmap.GroundMapper.explain`.
+        As `groundmap.GroundMapper.explain` returns them.
     grid : ConfidenceGrid
         The mapper's grid, for its cells.
-    title : str
+    title : str, default ""
     """
     from matplotlib.figure import Figure
 
@@ -67,7 +67,13 @@ def _reach(parts: ViewParts) -> tuple[Floats, Floats]:
 
 
 def draw_features(parts: ViewParts, *, ax: Axes) -> None:
-    """Draw obstacle features by height, ground features, and what lies below the ground."""
+    """Draw obstacle features by height, ground features, and features below the ground.
+
+    Parameters
+    ----------
+    parts : ViewParts
+    ax : matplotlib Axes
+    """
     ground_view = parts.ground_view
     points = ax.scatter(
         ground_view.points[:, 0],
@@ -92,20 +98,32 @@ def draw_features(parts: ViewParts, *, ax: Axes) -> None:
 
 
 def draw_triangulation(parts: ViewParts, *, ax: Axes) -> None:
-    """Draw which edges of the triangulation are surfaces, and which are frontiers."""
+    """Draw the edges of the triangulation: surfaces and frontiers.
+
+    Parameters
+    ----------
+    parts : ViewParts
+    ax : matplotlib Axes
+    """
     from matplotlib.collections import LineCollection
 
     frontiers = LineCollection(
         list(parts.surfaces.frontiers), colors="0.75", linewidths=0.6, linestyles="--"
     )
-    frontiers.set_label("frontiers: too long to believe")
+    frontiers.set_label("frontiers: longer than a link")
     ax.add_collection(frontiers)
     draw_surfaces(parts, ax=ax)
     ax.set_title("constrained Delaunay triangulation", fontsize=10)
 
 
 def draw_surfaces(parts: ViewParts, *, ax: Axes) -> None:
-    """Draw segments, links and lone points."""
+    """Draw segments, links and lone points.
+
+    Parameters
+    ----------
+    parts : ViewParts
+    ax : matplotlib Axes
+    """
     from matplotlib.collections import LineCollection
 
     for kind, (color, width, label) in SURFACES.items():
@@ -117,7 +135,13 @@ def draw_surfaces(parts: ViewParts, *, ax: Axes) -> None:
 
 
 def draw_fan(parts: ViewParts, *, ax: Axes) -> None:
-    """Draw the triangles of visible freespace, by what ends them, and the surfaces."""
+    """Draw the triangles of visible free space, by the kind of their end, and the surfaces.
+
+    Parameters
+    ----------
+    parts : ViewParts
+    ax : matplotlib Axes
+    """
     from matplotlib.collections import LineCollection, PolyCollection
 
     fan = parts.fan
@@ -126,20 +150,28 @@ def draw_fan(parts: ViewParts, *, ax: Axes) -> None:
     on_ground = fan.surface < 0
     for rows, color, label in (
         (~on_ground, "#dbe9f4", "free up to a surface"),
-        (on_ground, "#e3efd6", "free as far as ground is seen"),
+        (on_ground, "#e3efd6", "free up to the last ground feature"),
     ):
         pieces = PolyCollection(list(triangles[rows]), facecolors=color, edgecolors="none")
         pieces.set_label(label)
         ax.add_collection(pieces)
     ends = LineCollection(list(fan.ends), colors=SEEN_END, linewidths=0.8)
-    ends.set_label("where sight ends")
+    ends.set_label("end of sight")
     ax.add_collection(ends)
     draw_surfaces(parts, ax=ax)
     ax.set_title(f"sight fan: {len(fan.free)} triangles, {fan.area:.0f} m²", fontsize=10)
 
 
 def draw_evidence(parts: ViewParts, grid: ConfidenceGrid, *, ax: Axes) -> None:
-    """Draw z of every cell that the view speaks of."""
+    """Draw the evidence z of the cells that the view observed.
+
+    Parameters
+    ----------
+    parts : ViewParts
+    grid : ConfidenceGrid
+        The mapper's grid, for its cells.
+    ax : matplotlib Axes
+    """
     lower, z = parts.evidence
     x, y = grid.origin + lower[::-1] * grid.resolution
     rows, cols = z.shape
@@ -152,7 +184,7 @@ def draw_evidence(parts: ViewParts, grid: ConfidenceGrid, *, ax: Axes) -> None:
         vmax=1.0,
         interpolation="nearest",
     )
-    ax.figure.colorbar(picture, ax=ax, label="z: free below 0, non-free above", shrink=0.7)
+    ax.figure.colorbar(picture, ax=ax, label="z: negative free, positive non-free", shrink=0.7)
     ax.set_facecolor("0.8")
     ax.set_xlabel("x [m, map]")
     ax.set_ylabel("y [m, map]")

@@ -1,4 +1,4 @@
-"""Files: logs of views and maps in, logs of views and maps for other programs out."""
+"""Readers and writers of files: logs of views and maps."""
 
 from groundmap.io.export import EXPORTERS, export, files_written
 from groundmap.io.folder_writer import write_views

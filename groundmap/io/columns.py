@@ -1,4 +1,4 @@
-"""The columns of feature tables: what a row of points or segments holds, in its two forms."""
+"""The columns of feature tables: rows of points or segments, in pixels or in XYZ."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ KINDS: tuple[Kind, ...] = ("points", "segments")
 
 PIXEL_FIELDS = ("uL", "uR", "v")
 XYZ_FIELDS = ("x", "y", "z", "cxx", "cxy", "cxz", "cyy", "cyz", "czz")
-# Where the six numbers of a covariance stand in its 3 x 3 matrix, and the reverse.
+# Indices of the six numbers of a covariance in its 3 x 3 matrix, and the reverse.
 SYMMETRIC = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
 UPPER = np.triu_indices(3)
-LARGEST_ID = 2**53  # an archive keeps ids as float64, which counts no further
+LARGEST_ID = 2**53  # archives store ids as float64, which is exact up to here
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,14 @@ class Layout:
         return record(["view", "id"], self.ends * len(self.fields))
 
     def features(self, rows: npt.NDArray[Any], rig: StereoRig) -> tuple[Features, Counter[str]]:
-        """Return the features of rows, and how many had no 3-D point, by reason."""
+        """Return the features of rows, and the number of rows without a 3-D point, by reason.
+
+        Parameters
+        ----------
+        rows : ndarray, shape (n,)
+            Of type `row`.
+        rig : StereoRig
+        """
         shape = (
             (len(rows), len(self.fields)) if self.ends == 1 else (len(rows), 2, len(self.fields))
         )
@@ -68,12 +75,12 @@ class Layout:
         if self.fields == PIXEL_FIELDS:
             xyz, covariance, kept, dropped = rig.triangulate(values)
             return Features(xyz, covariance, ids[kept]), dropped
-        # Copies, so that a view does not keep the table it came from in memory.
+        # Copies, so that a view does not keep its table in memory.
         xyz, covariance = values[..., :3].copy(), _covariance(values)
         return Features(xyz, covariance, ids.copy()), Counter()
 
     def wrong_covariance(self, rows: npt.NDArray[Any]) -> WrongCovariance | None:
-        """Return the first row with a covariance that none can be."""
+        """Return the first row with an invalid covariance, or None."""
         if self.fields == PIXEL_FIELDS:
             return None
         values = rows["values"].reshape(len(rows), self.ends, len(self.fields))
@@ -94,10 +101,18 @@ LAYOUTS: dict[Kind, tuple[Layout, Layout]] = {
 def find_layout(path: Path, kind: Kind, columns: tuple[str, ...]) -> Layout:
     """Return the layout with these columns.
 
+    Parameters
+    ----------
+    path : Path
+        For the error message.
+    kind : {"points", "segments"}
+    columns : tuple of str
+        Names, as in the header.
+
     Raises
     ------
     FileFormatError
-        There is none.
+        No layout has these columns.
     """
     for layout in LAYOUTS[kind]:
         if layout.columns == columns:
@@ -108,7 +123,7 @@ def find_layout(path: Path, kind: Kind, columns: tuple[str, ...]) -> Layout:
 
 
 def values_of(features: Features) -> Floats:
-    """Return the numbers of features in XYZ form, a row each; the upper half of a covariance."""
+    """Return the numbers of features in XYZ form, one row each, with upper half covariances."""
     upper = features.covariance[..., UPPER[0], UPPER[1]]
     numbers = np.concatenate([features.xyz, upper], axis=-1)
     return numbers.reshape(len(features), math.prod(numbers.shape[1:]))

@@ -1,4 +1,4 @@
-"""Dense arrays of a map, for NumPy: ``.npz``."""
+"""Export of a map as dense NumPy arrays: ``.npz``."""
 
 from __future__ import annotations
 
@@ -15,24 +15,32 @@ from groundmap.grid.window import GridWindow
 
 
 def dense_window(grid: ConfidenceGrid, bounds: npt.ArrayLike | None = None) -> GridWindow:
-    """Return a box of a map, or the box around all that was seen, dense.
+    """Return a part of a map as dense arrays.
+
+    Parameters
+    ----------
+    grid : ConfidenceGrid
+    bounds : array_like, shape (2 d,), optional
+        Lower, then upper corner of the part [m, map]; default: all observed cells.
 
     Raises
     ------
     InputError
-        Nothing was seen: an empty array has no place in the map. Bounds that are no box, or a box
-        with too many cells.
+        An empty map, since an empty array has no place in the map; invalid bounds; a box with too
+        many cells.
     """
     window = grid.window(bounds)
     if not window.count.size:
-        raise InputError("grid", "a map of something", "an empty one", hint="Map some views first.")
+        raise InputError(
+            "grid", "a map with known cells", "an empty one", hint="Map some views first."
+        )
     return window
 
 
 def write_dense(
     grid: ConfidenceGrid, path: str | PathLike[str], *, bounds: npt.ArrayLike | None = None
 ) -> None:
-    """Write the dense arrays of a map, to be read with `numpy.load`.
+    """Write the dense arrays of a map to a file for `numpy.load`.
 
     ``confidence`` (float32), ``count`` and ``drop_offs`` (uint32) are indexed ``[row, col]``,
     ``[layer, row, col]`` in 3-D; ``resolution`` [m/cell]; ``origin`` (x, y) [m, map] is the outer
@@ -43,14 +51,14 @@ def write_dense(
     grid : ConfidenceGrid
     path : path
     bounds : array_like, shape (2 d,), optional
-        Part to write, lower then upper corner [m, map]; all that was seen unless told.
+        Part to write, lower, then upper corner [m, map]; default: all observed cells.
 
     Raises
     ------
     InputError
-        An empty map, bounds that are no box, or a box with too many cells.
+        An empty map, invalid bounds, or a box with too many cells.
     OSError
-        The folder does not exist or can't be written to.
+        The folder does not exist or is not writable.
     """
     window = dense_window(grid, bounds)
 

@@ -1,4 +1,4 @@
-"""Rows of a table put in the order of their views, on disk."""
+"""Sort of the rows of a table by view, on disk."""
 
 from __future__ import annotations
 
@@ -18,15 +18,16 @@ CHUNK_ROWS = 65_536
 class RowsByView:
     """Rows sorted by their column ``view``; rows of the same view keep their order.
 
-    A counting sort between two temporary files (in the folder that TMPDIR names): memory holds
-    one chunk, and two numbers per view. The files have no name on most systems, and are gone with
-    this object, however the program ends.
+    A counting sort between two temporary files (in the folder that TMPDIR names). Memory holds
+    one chunk, and two numbers per view. On most systems the files have no name, and are deleted
+    with this object, however the program ends.
 
     Parameters
     ----------
-    chunks : iterable of ndarray, of type `row`
+    chunks : iterable of ndarray
+        Of type `row`.
     views : int
-        Number of views; the column ``view`` is below it.
+        Number of views; every value of the column ``view`` is below it.
     row : dtype
 
     Examples
@@ -39,7 +40,7 @@ class RowsByView:
 
     def __init__(self, chunks: Iterable[npt.NDArray[Any]], views: int, row: np.dtype[Any]) -> None:
         self._row = row
-        self._file = tempfile.TemporaryFile()  # noqa: SIM115 (open as long as this object lives)
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115 (open for the lifetime of this object)
         weakref.finalize(self, self._file.close)
         counts = np.zeros(views, dtype=np.int64)
         with tempfile.TemporaryFile() as spool:
@@ -60,7 +61,7 @@ class RowsByView:
         start, stop = self._offsets[view : view + 2].tolist()
         if start == stop:
             return np.empty(0, dtype=self._row)
-        # Mapping, unlike seeking, leaves other threads and forked processes alone.
+        # Mapping, unlike seeking, does not affect other threads and forked processes.
         offset, shape = start * self._row.itemsize, (stop - start,)
         return np.array(np.memmap(self._file, self._row, mode="r", offset=offset, shape=shape))
 
@@ -71,8 +72,8 @@ def _chunks_of(spool: IO[bytes], row: np.dtype[Any]) -> Iterator[npt.NDArray[Any
 
 
 def _place(chunks: Iterable[npt.NDArray[Any]], file: IO[bytes], free: Ints) -> None:
-    """Write every row to the next free place of its view; `free` is moved on."""
-    # Written, not mapped: a full disk is an exception here, but kills a process that maps.
+    """Write every row to the next free place of its view, and advance `free`."""
+    # Written, not mapped: a full disk raises here, but kills a process that maps.
     for chunk in chunks:
         grouped = chunk[np.argsort(chunk["view"], kind="stable")]
         views, first, counts = np.unique(grouped["view"], return_index=True, return_counts=True)

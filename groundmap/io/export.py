@@ -1,4 +1,4 @@
-"""Maps for other programs, by the suffix of the file."""
+"""Export of maps for other programs, by the suffix of the file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from groundmap.io.ros_map import write_ros_map
 
 
 class Exporter(Protocol):
-    """Writes the part of a map within bounds, all of it unless told, to a file."""
+    """Writes the part of a map within bounds to a file; default: the whole map."""
 
     def __call__(
         self,
@@ -24,7 +24,15 @@ class Exporter(Protocol):
         *,
         bounds: npt.ArrayLike | None = None,
     ) -> None:
-        """Write the map."""
+        """Write the map.
+
+        Parameters
+        ----------
+        grid : ConfidenceGrid
+        path : path
+        bounds : array_like, shape (2 d,), optional
+            As for `export`.
+        """
 
 
 EXPORTERS: dict[str, Exporter] = {
@@ -34,12 +42,12 @@ EXPORTERS: dict[str, Exporter] = {
 
 
 def files_written(path: str | PathLike[str]) -> list[Path]:
-    """Return the files that `export` writes: the one named, and the image beside a ``.yaml``.
+    """Return the files that `export` writes: `path`, and the image beside a ``.yaml``.
 
     Raises
     ------
     InputError
-        Another suffix than those of `EXPORTERS`.
+        A suffix that is not in `EXPORTERS`.
 
     Examples
     --------
@@ -57,22 +65,22 @@ def files_written(path: str | PathLike[str]) -> list[Path]:
 def export(
     grid: ConfidenceGrid, path: str | PathLike[str], *, bounds: npt.ArrayLike | None = None
 ) -> None:
-    """Write a map in the form that the file's suffix names, a key of `EXPORTERS`.
+    """Write a map in the format of the file's suffix, a key of `EXPORTERS`.
 
     Parameters
     ----------
     grid : ConfidenceGrid
     path : path
     bounds : array_like, shape (2 d,), optional
-        Part to write, lower then upper corner [m, map]; all that was seen unless told.
+        Part to write, lower, then upper corner [m, map]; default: all observed cells.
 
     Raises
     ------
     InputError
-        Another suffix, an empty map, one that the form can't hold, bounds that are no box, or a
-        box with more cells than `ConfidenceGrid.window` returns.
+        An unknown suffix, an empty map, a map that the format does not support, invalid bounds, or
+        a box with more cells than `ConfidenceGrid.window` returns.
     OSError
-        The folder does not exist or can't be written to.
+        The folder does not exist or is not writable.
 
     Examples
     --------

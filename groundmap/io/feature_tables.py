@@ -1,4 +1,4 @@
-"""Tables of features in the order of the views, from csv files (streamed) or an npz archive."""
+"""Tables of features sorted by view, from csv files (streamed) or an npz archive."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ COVARIANCE = "a covariance that is "
 
 
 class ViewFeatures(NamedTuple):
-    """What a table says of one view."""
+    """The features of one view in a table."""
 
     features: Features
     dropped: Counter[str]  #: rows without a 3-D point, by reason
@@ -37,21 +37,28 @@ class FeatureTable(ABC):
 
     @abstractmethod
     def chunks(self, views: int) -> Iterable[npt.NDArray[Any]]:
-        """Iterate over the rows, checked to ascend and to be of one of so many views."""
+        """Iterate over the rows; their views are checked to ascend, and to be below `views`."""
 
     def by_view(self, views: int, rig: StereoRig) -> Iterator[ViewFeatures]:
-        """Iterate over exactly that many views, those without a row included."""
+        """Iterate over the views, including those without rows.
+
+        Parameters
+        ----------
+        views : int
+            Number of views.
+        rig : StereoRig
+        """
         for rows in split_by_view(self.chunks(views), views, self.layout.row):
             yield ViewFeatures(*self.layout.features(rows, rig))
 
 
 class CsvTable(FeatureTable):
-    """A csv file, read anew by every iteration; a file that is not there is an empty table."""
+    """A csv file, which every iteration reads again; a missing file is an empty table."""
 
     def __init__(self, path: Path, kind: Kind) -> None:
-        self.path, self.there = path, path.exists()
+        self.path, self.exists = path, path.exists()
         self.layout = LAYOUTS[kind][0]
-        if self.there:
+        if self.exists:
             with open_rows(path) as stream:
                 header = stream.readline().strip()
             names = tuple(name.strip() for name in header.split(",")) if header else ()
@@ -59,7 +66,7 @@ class CsvTable(FeatureTable):
 
     def chunks(self, views: int) -> Iterator[npt.NDArray[Any]]:
         """Iterate over the rows, a chunk of lines at a time."""
-        if not self.there:
+        if not self.exists:
             return
         last = 0
         for values, lines in read_rows(self.path, self.layout.row, delimiter=",", header=True):
@@ -87,7 +94,7 @@ class ArrayTable(FeatureTable):
         self.path, self.layout, self.rows = path, layout, rows
 
     def chunks(self, views: int) -> Iterator[npt.NDArray[Any]]:
-        """Iterate over all the rows at once."""
+        """Yield all rows as one chunk."""
         wrong = first_wrong(self.rows["view"], 0, views)
         if wrong is not None:
             got = f"{wrong.got} in row {wrong.row}"
@@ -105,7 +112,7 @@ def read_npz(path: Path) -> dict[Kind, FeatureTable]:
     Raises
     ------
     FileFormatError
-        No archive, other arrays than described, ids that are not whole numbers.
+        Not an archive, unknown arrays, ids that are not whole numbers.
     """
     arrays = read_arrays(path)
     known = [*KINDS, *(f"{kind}_columns" for kind in KINDS)]

@@ -1,23 +1,23 @@
-"""A folder of views: our own format, plain text, easy to write from any program.
+"""A folder of views: a plain-text format that is easy to write from any program.
 
 ``rig.toml``
     ``world = "optical"`` (x right, y down, z forward) or ``"rep103"`` (z up), ``fx``, ``fy``,
     ``cx``, ``cy`` [px], ``baseline`` [m]; optional ``pixel_noise_px`` and ``T_base_camera``, the
-    camera in ``base_link`` as four lists of four numbers (the identity unless told).
+    camera in ``base_link`` as four lists of four numbers (default: the identity).
 ``poses.txt``
     One row per view, the pose of ``base_link`` in the world: ``timestamp tx ty tz qx qy qz qw``.
 ``points.csv``
     With the header ``view,id,uL,uR,v``, or ``view,id,x,y,z,cxx,cxy,cxz,cyy,cyz,czz`` (camera
-    frame). ``view`` is the zero-based row of ``poses.txt``, ascending; id -1 is none.
+    frame). ``view`` is the zero-based row of ``poses.txt``, ascending; id -1 means no id.
 ``segments.csv``
     The same with both ends: ``view,id,uL0,uR0,v0,uL1,uR1,v1``, or ``view,id,x0,...,czz0,x1,...``.
     Either of the two tables may be missing.
 ``features.npz``
-    Instead of both, and read into memory: ``points`` and/or ``segments``, the same columns as
-    2-D arrays, with ``points_columns`` and ``segments_columns``, their names.
+    Instead of both tables, and read into memory: ``points`` and/or ``segments``, 2-D arrays of the
+    same columns, and ``points_columns`` and ``segments_columns``, the names of the columns.
 
-In the text files, blank lines and what follows a ``#`` are passed over; a table's header is its
-first line.
+Blank lines and comments from ``#`` to the end of the line are ignored in the text files; the first
+line of a table is its header.
 """
 
 from __future__ import annotations
@@ -39,15 +39,15 @@ TABLES: dict[Kind, str] = {"points": "points.csv", "segments": "segments.csv"}
 
 
 class FolderLog(ViewLog):
-    """Views of a folder in our own format.
+    """Views of a folder in the format that `groundmap.io.folder` describes.
 
-    Rig, poses and headers are read when the log is opened; the rows of the csv tables are
-    streamed, and checked, anew by every iteration.
+    Rig, poses and headers are read when the log is opened. Every iteration streams and checks the
+    rows of the csv tables again.
 
     Raises
     ------
     FileFormatError
-        Besides what the files may lack: features in none of the tables' files, or in both kinds.
+        A missing or invalid file; no file with features, or both csv tables and an archive.
     """
 
     looks_for = f"{RIG}, or one of {', '.join(TABLES.values())} and {ARCHIVE}"
@@ -63,7 +63,7 @@ class FolderLog(ViewLog):
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
-        """Return whether a rig or a table of features is there; other formats have poses, too."""
+        """Return whether a rig or a table of features exists; other formats have poses, too."""
         return any((path / name).is_file() for name in (RIG, ARCHIVE, *TABLES.values()))
 
     def __len__(self) -> int:
@@ -86,13 +86,13 @@ class FolderLog(ViewLog):
 
 
 def _find_tables(path: Path) -> dict[Kind, FeatureTable]:
-    there = [name for name in TABLES.values() if (path / name).exists()]
+    tables = [name for name in TABLES.values() if (path / name).exists()]
     archive = (path / ARCHIVE).exists()
-    if archive and there:
-        raise FileFormatError(path, f"{ARCHIVE} or csv tables", f"both {ARCHIVE} and {there[0]}")
+    if archive and tables:
+        raise FileFormatError(path, f"{ARCHIVE} or csv tables", f"both {ARCHIVE} and {tables[0]}")
     if archive:
         return read_npz(path / ARCHIVE)
-    if not there:
+    if not tables:
         names = ", ".join(TABLES.values())
         raise FileFormatError(path, f"one of {names} and {ARCHIVE}", "none of them")
     return {kind: CsvTable(path / name, kind) for kind, name in TABLES.items()}

@@ -1,4 +1,4 @@
-"""Write views to a folder in our own format (`groundmap.io.folder` describes it)."""
+"""Writer of folders of views, in the format that `groundmap.io.folder` describes."""
 
 from __future__ import annotations
 
@@ -34,28 +34,28 @@ def write_views(
 ) -> None:
     """Write views to a folder that `read_views` reads back.
 
-    One view is held at a time. Features come back bit by bit (of a covariance, its upper half is
-    written), poses to 1e-12; a rotation that is orthonormal only to the few digits of the file it
-    came from comes back as the true rotation beside it, since a quaternion can't be anything
-    else. A view's ground plane, and what it dropped, are not written.
+    Memory holds one view at a time. Features are restored bit by bit (the upper half of a
+    covariance is written), poses to 1e-12. A rotation that is orthonormal only to a few digits is
+    restored as the nearest true rotation, since it is written as a quaternion. The ground plane of
+    a view and its counts of dropped features are not written.
 
     Parameters
     ----------
     views : iterable of View
-        At least one, all with the same rig. A view without a timestamp gets its index.
+        At least one, all with the same rig. The timestamp of a view without one is its index.
     path : path
-        The folder to make: new or empty. It appears when everything is written, not before.
+        The folder to create, new or empty. It appears only after everything is written.
     features : {'csv', 'npz'}, default 'csv'
-        Text tables, or one archive of arrays: faster, but read into memory.
+        Text tables, or one archive of arrays, which is faster but read into memory.
     overwrite : bool, default False
-        Replace a folder of views. One that holds any other file is left alone.
+        Whether to replace a folder of views. A folder that holds other files is never replaced.
 
     Raises
     ------
     InputError
         No views, two rigs, a timestamp that is not finite, a folder that is not empty.
     OSError
-        The folder's parent does not exist or can't be written to.
+        The folder's parent does not exist or is not writable.
     """
     if features not in WRITERS:
         raise InputError("features", f"one of {', '.join(WRITERS)}", repr(features))
@@ -65,7 +65,7 @@ def write_views(
     with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as scratch:
         folder = Path(scratch) / "views"
         folder.mkdir()
-        WRITERS[features](_passing(views, folder), folder)
+        WRITERS[features](_write_poses(views, folder), folder)
         _swap(folder, target, Path(scratch) / "replaced")
 
 
@@ -95,8 +95,8 @@ def _swap(folder: Path, target: Path, aside: Path) -> None:
         raise
 
 
-def _passing(views: Iterable[View], folder: Path) -> Iterator[tuple[int, View]]:
-    """Write the rig and the poses of views that pass through, numbered."""
+def _write_poses(views: Iterable[View], folder: Path) -> Iterator[tuple[int, View]]:
+    """Write the rig and the poses of views, and yield the views with their indices."""
     rig: dict[str, Any] = {}
     with open(folder / POSES, "w", encoding="utf-8") as stream:
         stream.write("# timestamp tx ty tz qx qy qz qw\n")
@@ -139,13 +139,13 @@ def _write_csv(views: Iterable[tuple[int, View]], folder: Path) -> None:
 def _csv_lines(index: int, features: Features) -> Iterator[str]:
     rows = zip(features.ids.tolist(), values_of(features).tolist(), strict=True)
     for landmark, values in rows:
-        # repr gives the shortest digits that read back as the same float.
+        # repr returns the shortest digits that restore the same float.
         yield f"{index},{landmark},{','.join(map(repr, values))}\n"
 
 
 def _write_npz(views: Iterable[tuple[int, View]], folder: Path) -> None:
     with ExitStack() as stack:
-        # An archive wants its arrays whole; collected in files, they need not fit in memory.
+        # np.savez needs complete arrays; as memory-mapped files, they need not fit in memory.
         files = {
             kind: stack.enter_context(tempfile.TemporaryFile(dir=folder.parent)) for kind in KINDS
         }

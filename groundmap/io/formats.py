@@ -1,4 +1,4 @@
-"""The formats of logs by name, and the function that finds the right one."""
+"""The formats of logs by name, and `read_views`, which recognises them."""
 
 from __future__ import annotations
 
@@ -28,24 +28,24 @@ def read_views(
     path : path
         The folder that holds the log.
     format : str, optional
-        A key of `FORMATS`; recognised by the folder's files unless told.
+        A key of `FORMATS`; default: recognised by the folder's files.
     poses : path, optional
         A file whose poses replace the log's, in the same world: rows of ``timestamp tx ty tz
-        qx qy qz qw``, or of an id and the 16 numbers of the transform. A GTSAM log looks them up
-        by id (the timestamps are the ids); a folder takes them row by row, timestamps being the
-        same (ids are indices of views).
+        qx qy qz qw``, or of an id and the 16 numbers of the transform. A GTSAM log finds them by
+        id (timestamps are taken as ids); a folder uses them row by row, and their timestamps must
+        be those of the log (ids are taken as indices of views).
 
     Returns
     -------
     ViewLog
-        Sized and re-iterable; it makes one view at a time.
+        Sized and re-iterable; it creates one view at a time.
 
     Raises
     ------
     InputError
-        A format that does not exist; those there are are listed, the nearest first.
+        An unknown format; the error lists the known ones, the nearest first.
     FileFormatError
-        No folder, a folder of no known format, or files that do not say what theirs asks for.
+        Not a folder, a folder of no known format, or invalid files.
 
     Examples
     --------
@@ -67,7 +67,7 @@ def read_views(
     check_name(folder, "a folder of views")
     if not folder.is_dir():
         if folder.exists():
-            hint = "Give the folder that holds it."
+            hint = "Give the folder that contains it."
             raise FileFormatError(folder, "a folder of views", "a file", hint=hint)
         raise FileFormatError(folder, "a folder of views", "nothing of that name")
     log = FORMATS[format] if format is not None else _recognise(folder)

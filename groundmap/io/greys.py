@@ -1,4 +1,4 @@
-"""The greys of images, read by the format of their pixels."""
+"""Grey values of images, for every pixel format that they may have."""
 
 from __future__ import annotations
 
@@ -22,34 +22,34 @@ BITS, PHOTOMETRIC, SAMPLE_FORMAT = 258, 262, 339  # tags of a TIFF
 WHITE_IS_ZERO, UNSIGNED = 0, 1  # values of the last two
 READ_BY = "an image of whole numbers of up to 16 bits"
 HINT = "Save it as a PNG of 8 bits."
-# What Pillow raises at damaged images, found by damaging them.
+# Exceptions that Pillow raises for damaged images, as the fuzzer found them.
 DAMAGES = (OSError, EOFError, ValueError, SyntaxError, TypeError, LookupError, ArithmeticError,
            AttributeError, RuntimeError, MemoryError, Image.DecompressionBombError)  # fmt: skip
 
 
 class Greys(NamedTuple):
-    """How bright the pixels of an image are."""
+    """The brightness of the pixels of an image."""
 
     grey: npt.NDArray[np.uint16]  #: shape (rows, cols): the sum of all channels
-    white: int  #: the largest value that it can have
+    white: int  #: the largest possible value of `grey`
 
 
 def read_greys(path: Path, expected: str) -> Greys:
-    """Read an image of whole numbers of up to 16 bits, of any number of channels.
+    """Read an image of whole numbers of up to 16 bits, with any number of channels.
 
     Parameters
     ----------
     path : Path
     expected : str
-        What the file should be, for the error.
+        Description of the file for the error message.
 
     Raises
     ------
     FileFormatError
-        A file that is missing or can't be read; pixels of another kind.
+        A file that is missing or not readable, or pixels of another type.
     """
     with open_file(path, expected) as stream, warnings.catch_warnings():
-        # Pillow warns of large images, and of damaged metadata that is not needed here.
+        # Pillow warns of large images, and of damaged metadata, which is not used here.
         warnings.simplefilter("ignore")
         try:
             with Image.open(stream, formats=FORMATS) as image:
@@ -66,10 +66,10 @@ def _greys(path: Path, image: Image.Image) -> Greys:
     if isinstance(image, TiffImagePlugin.TiffImageFile):
         _check_samples(path, image)
         white_is_zero = _tag(image, PHOTOMETRIC) == WHITE_IS_ZERO
-    # Pillow has 16-bit images of PGM, and in older releases of PNG, in 32 bits.
+    # Pillow stores 16-bit images of PGM, and in older releases of PNG, in 32 bits.
     if image.mode in SIXTEEN_BITS or (image.mode == "I" and image.format in ("PNG", "PPM")):
         pixels = np.asarray(image).astype(np.uint16)
-        # Of 8 bits and less, Pillow has turned them already.
+        # Pillow has already inverted images of up to 8 bits.
         return Greys(65535 - pixels if white_is_zero else pixels, 65535)
     if image.mode.startswith(("I", "F")):
         raise FileFormatError(path, READ_BY, f"one of mode {image.mode}", hint=HINT)
@@ -93,7 +93,7 @@ def _check_size(path: Path, image: Image.Image) -> None:
 
 
 def _check_samples(path: Path, image: TiffImagePlugin.TiffImageFile) -> None:
-    """Refuse what Pillow reads as if it were of another range: signed, real, of 12 bits."""
+    """Refuse samples that Pillow reads with a wrong range: signed, real, of 12 bits."""
     bits, kind = _tag(image, BITS, 1), _tag(image, SAMPLE_FORMAT, UNSIGNED)
     if kind != UNSIGNED or bits not in (1, 2, 4, 8, 16):
         name = {2: "signed whole", 3: "real"}.get(kind, "whole")
@@ -101,6 +101,6 @@ def _check_samples(path: Path, image: TiffImagePlugin.TiffImageFile) -> None:
 
 
 def _tag(image: TiffImagePlugin.TiffImageFile, number: int, default: int = -1) -> int:
-    """Return a tag; of one with a value for each channel, the first."""
+    """Return a tag; if it has a value per channel, the first."""
     value = image.tag_v2.get(number, default)
     return int(value[0] if isinstance(value, tuple) else value)

@@ -1,10 +1,10 @@
-"""The GTSAM visual-odometry text set.
+"""Reader of the visual-odometry text sets of GTSAM.
 
 ``VO_calibration.txt``
     ``fx fy skew cx cy baseline`` [px, m], skew 0.
 ``VO_camera_poses.txt``
     ``id`` and the 16 numbers of camera to world, row by row. The world is optical: x right,
-    y down, z forward. Views come in ascending id, whatever the order of the rows.
+    y down, z forward. Views are sorted by id; the rows may have any order.
 ``VO_stereo_factors.txt``
     ``pose_id landmark_id uL uR v X Y Z``, in any order.
 """
@@ -34,8 +34,8 @@ CALIBRATION, POSES, FACTORS = (
     "VO_stereo_factors.txt",
 )
 CALIBRATION_ROW = record([], 6)
-# X Y Z are read to check the row, and not used: they are the same pixels triangulated with the
-# same rig, but without the covariance that the pixels give.
+# X Y Z are read to check the row, and ignored: they are the same pixels triangulated with the same
+# rig, but without the covariance that the pixels give.
 FACTOR_ROW = record(["pose", "landmark"], 6)
 STORED_ROW = np.dtype([("view", np.int64), ("id", np.int64), ("pixels", np.float64, (3,))])
 
@@ -43,14 +43,14 @@ STORED_ROW = np.dtype([("view", np.int64), ("id", np.int64), ("pixels", np.float
 class GtsamLog(ViewLog):
     """Views of a GTSAM visual-odometry set.
 
-    All files are checked, and the factors sorted on disk, when the log is opened: iterating then
-    reads one view's rows at a time. Landmark ids become the ids of the points; a pose without
-    factors is an empty view.
+    All files are checked, and the factors sorted on disk, when the log is opened. An iteration then
+    reads the rows of one view at a time. Landmark ids become the ids of the points; a pose without
+    factors becomes an empty view.
 
     Raises
     ------
     FileFormatError
-        Besides what the files may lack: two poses of one id, a factor of a pose there isn't.
+        A missing or invalid file, two poses with the same id, a factor of a nonexistent pose.
     """
 
     looks_for = f"{CALIBRATION}, {POSES} and {FACTORS}"
@@ -70,7 +70,7 @@ class GtsamLog(ViewLog):
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
-        """Return whether any of the three files is there: what is missing is said on opening."""
+        """Return whether any of the three files exists; opening reports the missing ones."""
         return any((path / name).is_file() for name in (CALIBRATION, POSES, FACTORS))
 
     def __len__(self) -> int:
@@ -116,14 +116,14 @@ def _read_factors(path: Path, ids: Ints) -> Iterator[npt.NDArray[Any]]:
 
 
 def _views_of(path: Path, rows: Rows, ids: Ints) -> Ints:
-    wanted = rows.values["pose"]
-    views = np.searchsorted(ids, wanted).clip(max=len(ids) - 1)
-    unknown = np.flatnonzero(ids[views] != wanted)
+    poses = rows.values["pose"]
+    views = np.searchsorted(ids, poses).clip(max=len(ids) - 1)
+    unknown = np.flatnonzero(ids[views] != poses)
     if len(unknown):
         raise FileFormatError(
             path,
             f"the id of a pose in {POSES}",
-            str(wanted[unknown[0]]),
+            str(poses[unknown[0]]),
             line=int(rows.lines[unknown[0]]),
         )
     return views

@@ -1,4 +1,4 @@
-"""Maps to plan on, by the suffix of the file."""
+"""Loading of maps, by the suffix of the file."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ LOADERS: dict[str, Callable[[Path], ConfidenceGrid]] = {
 
 
 def load_map(path: str | PathLike[str]) -> ConfidenceGrid:
-    """Return the map in a file, whoever wrote it.
+    """Return the map in a file of any supported format.
 
     ``.npz``: a grid that `ConfidenceGrid.save` wrote; ``.yaml`` or ``.yml``: a map of Nav2's
     map_server, with its image; ``.map`` and ``.3dmap``: maps of the MovingAI benchmark, with cells
-    of 1 m. A file with another suffix is read as if it ended in ``.npz``.
+    of 1 m. Files with other suffixes are read as ``.npz``.
 
     Raises
     ------
     FileFormatError
-        A file that is missing, or breaks its format.
+        A file that is missing, or violates its format.
     InputError
-        An image: it says neither how large its cells are nor where they lie.
+        An image, which defines neither the size of its cells nor their place.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""A recorded log of views: the small base of every format."""
+"""Recorded logs of views: the base class of every format."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from groundmap.view.view import View
 
 
 class ViewLog(ABC):
-    """The views of one log on disk, as many times as asked for.
+    """The views of one log on disk, which can be iterated over repeatedly.
 
-    ``len(log)`` is the number of views; every ``for view in log`` reads from the start and makes
+    ``len(log)`` is the number of views. Every ``for view in log`` reads from the start and creates
     one view at a time, so that a log may be larger than memory.
 
     Parameters
@@ -21,15 +21,15 @@ class ViewLog(ABC):
     path : Path
         The log's folder.
     poses : Path, optional
-        A file whose poses replace the log's own; `groundmap.io.poses` describes its two forms.
+        A file whose poses replace those of the log, in a form that `groundmap.io.poses` describes.
 
     Raises
     ------
     FileFormatError
-        A file that is missing or does not say what the format asks for.
+        A file that is missing, or violates the format.
     """
 
-    looks_for: ClassVar[str]  #: what `recognises` looks for, as it reads in an error message
+    looks_for: ClassVar[str]  #: files that `recognises` looks for, for error messages
 
     def __init__(self, path: Path, *, poses: Path | None = None) -> None:
         self.path, self.poses_path = path, poses

@@ -1,4 +1,4 @@
-"""Maps that others drew: blocked cells in memory, and Nav2's map_server files."""
+"""Maps of blocked cells, and the reader of Nav2's map_server files."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ ROS_KEYS = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_
 NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 NEGATE = {"0": False, "false": False, "no": False, "off": False,
           "1": True, "true": True, "yes": True, "on": True}  # fmt: skip
-MOST_TURN = 1e-9  # [rad]: over a million cells, a thousandth of one
+MOST_TURN = 1e-9  # [rad]: 0.001 cells over a million cells
 
 
 class BlockedMap(NamedTuple):
-    """Which cells of a map are blocked; arrays are indexed ``[row, col]``, row growing along y."""
+    """Blocked cells of a map; arrays are indexed ``[row, col]``, row growing along y."""
 
     blocked: Bools  #: shape (rows, cols)
     unknown: Bools  #: shape (rows, cols); neither blocked nor free
@@ -34,7 +34,7 @@ class BlockedMap(NamedTuple):
 
 
 class BlockedVoxels(NamedTuple):
-    """Which cells of a 3-D map are blocked; indexed ``[layer, row, col]``, layers along z."""
+    """Blocked cells of a 3-D map; indexed ``[layer, row, col]``, layers along z."""
 
     blocked: Bools  #: shape (layers, rows, cols)
     resolution: float  #: side of a voxel [m]
@@ -42,9 +42,15 @@ class BlockedVoxels(NamedTuple):
 
 
 def grid_of(found: BlockedMap | BlockedVoxels, *, frame: str = "map") -> ConfidenceGrid:
-    """Return a map to plan on: as if one view had seen every cell that is not unknown.
+    """Return the confidence grid of a map of blocked cells.
 
-    Blocked cells have confidence 1, free ones -1.
+    Blocked cells have confidence 1, free cells -1, and a count of one view each.
+
+    Parameters
+    ----------
+    found : BlockedMap or BlockedVoxels
+    frame : str, default "map"
+        Name of the grid's frame.
 
     Examples
     --------
@@ -63,23 +69,23 @@ def grid_of(found: BlockedMap | BlockedVoxels, *, frame: str = "map") -> Confide
 
 
 def read_ros_map(path: str | PathLike[str]) -> BlockedMap:
-    """Read a map of Nav2's map_server, of mode trinary, as map_server reads it.
+    """Read a map of Nav2's map_server as map_server does; its mode must be trinary.
 
     A cell is blocked if its darkness is above ``occupied_thresh``, free if it is below
     ``free_thresh``, otherwise unknown. Darkness is (white - grey) / white, or grey / white if
-    ``negate`` is 1; grey is the mean of all channels, opacity among them. Row 0 is the smallest
-    y: the image's lowest.
+    ``negate`` is 1; grey is the mean of all channels, including opacity. Row 0 has the smallest y:
+    it is the lowest row of the image.
 
     Parameters
     ----------
     path : path
-        The ``.yaml`` file. The image that it names is looked for from the folder it lies in.
+        The ``.yaml`` file. The path of its image is relative to its folder.
 
     Raises
     ------
     FileFormatError
-        A file that is missing or can't be read, a key that is missing or not what it should be, a
-        map turned against its axes.
+        A file that is missing or not readable, a key that is missing or invalid, an origin with a
+        yaw.
     """
     path = Path(path)
     keys = _read_keys(path)
@@ -94,8 +100,8 @@ def read_ros_map(path: str | PathLike[str]) -> BlockedMap:
     origin = _origin(path, keys["origin"])
     grey, white = read_greys(path.parent / _image(path, keys), f"the image of {path.name}")
     levels = np.arange(white + 1)
-    # In whole numbers up to the quotient: grey 205 is the float nearest to 50 / 255, and a
-    # threshold that says the same is met exactly.
+    # Whole numbers up to the quotient: grey 205 is the float nearest to 50 / 255, which compares
+    # exactly with a threshold of the same value.
     darkness = (levels if negate else white - levels) / white
     blocked = darkness > occupied
     unknown = ~blocked & (darkness >= free)
@@ -108,7 +114,7 @@ def image_of(path: Path) -> Path:
     Raises
     ------
     FileFormatError
-        A file that is missing or can't be read, or names no image.
+        A file that is missing or not readable, or names no image.
     """
     return path.parent / _image(path, _read_keys(path))
 
@@ -152,5 +158,5 @@ def _origin(path: Path, value: Any) -> tuple[float, float]:
         raise FileFormatError(path, "an origin of [x, y, yaw]", format_value(value))
     x, y, yaw = (_number(path, part, "origin") for part in value)
     if abs(math.remainder(yaw, math.tau)) > MOST_TURN:
-        raise FileFormatError(path, "an origin of yaw 0", f"{yaw:g}", hint="Turn the image.")
+        raise FileFormatError(path, "an origin of yaw 0", f"{yaw:g}", hint="Rotate the image.")
     return x, y

@@ -1,4 +1,4 @@
-"""Maps of the MovingAI benchmark: ``.map`` and, of voxels, ``.3dmap``."""
+"""Readers of the maps of the MovingAI benchmark: ``.map``, and ``.3dmap`` for voxels."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def read_movingai_map(path: str | PathLike[str], *, resolution: float = 1.0) -> 
     """Read a ``.map`` of the MovingAI benchmark.
 
     ``.``, ``G`` and ``S`` (swamp) are free; ``@``, ``O``, ``T`` (trees) and ``W`` (water) are
-    blocked. The file's first row is row 0, at y = 0: a query's x and y are col and row. Where y
-    points upwards the map therefore shows as in a mirror.
+    blocked. The file's first row is row 0, at y = 0: x and y of a query are col and row. A plot
+    with y pointing upwards therefore mirrors the map.
 
     Parameters
     ----------
@@ -33,10 +33,10 @@ def read_movingai_map(path: str | PathLike[str], *, resolution: float = 1.0) -> 
     Raises
     ------
     FileFormatError
-        A file that is missing, a header without sizes, a row too many, too few, too short or too
-        long, an unknown kind of cell.
+        A missing file, a header without sizes, a wrong number of rows, a row of a wrong length, an
+        unknown kind of cell.
     InputError
-        A resolution that is not above 0.
+        A resolution that is not positive.
     """
     _check_resolution(resolution)
     path = Path(path)
@@ -71,9 +71,9 @@ def read_movingai_voxels(path: str | PathLike[str], *, resolution: float = 1.0) 
     Raises
     ------
     FileFormatError
-        A file that is missing, another first line, a line that is no voxel of the map.
+        A missing file, an invalid first line, a line that is not a voxel of the map.
     InputError
-        A resolution that is not above 0.
+        A resolution that is not positive.
     """
     _check_resolution(resolution)
     path = Path(path)
@@ -111,12 +111,12 @@ def _voxel_header(path: Path) -> tuple[int, int, int]:
 
 
 def _side(text: str) -> int:
-    """Return the length of a map's side; 0 for what can't be one."""
+    """Return the length of a side of a map; 0 if the text is not a length."""
     return int(text) if text.isdecimal() and len(text) <= MOST_DIGITS else 0
 
 
 def _movingai_header(path: Path, lines: list[str]) -> tuple[int, int, int]:
-    """Return how many lines the header has, and the map's rows and columns."""
+    """Return the number of lines of the header, and the rows and columns of the map."""
     sizes: dict[str, int] = {}
     for number, line in enumerate(lines, start=1):
         if line == "map":

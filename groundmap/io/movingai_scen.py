@@ -1,4 +1,4 @@
-"""Queries of the MovingAI benchmark, with their published lengths: ``.scen`` and ``.3dscen``."""
+"""Reader of the queries of the MovingAI benchmark: ``.scen`` and ``.3dscen``."""
 
 from __future__ import annotations
 
@@ -17,36 +17,36 @@ VOXEL_COLUMNS = "start x, y, z, goal x, y, z, length, ratio"
 
 
 class MovingAIQuery(NamedTuple):
-    """One row: from where to where, and how long the shortest way is."""
+    """One row: start, goal, and the published length of the shortest path."""
 
-    map_file: Path  #: beside the file of queries, whatever folder that one names
-    shape: tuple[int, ...]  #: rows and columns that the map has to have; empty for voxels
+    map_file: Path  #: beside the file of queries, whose own folders are ignored
+    shape: tuple[int, ...]  #: rows and columns that the map must have; empty for voxels
     start: tuple[int, ...]  #: cell ``[row, col]``, or voxel ``[layer, row, col]``
     goal: tuple[int, ...]  #: likewise
-    length: float  #: of the shortest way over the moves between neighbouring cells [cells]
-    line: int  #: of the file
+    length: float  #: of the shortest path over moves between neighbouring cells [cells]
+    line: int  #: one-based line of the file
 
     @property
     def solvable(self) -> bool:
-        """Whether a way was found: where there is none, some files say 0."""
+        """Whether a path exists; some files state length 0 if there is none."""
         return self.length > 0 or self.start == self.goal
 
 
 def read_movingai_scen(path: str | PathLike[str]) -> list[MovingAIQuery]:
     r"""Read the queries of a ``.scen``, or of a ``.3dscen``.
 
-    White space of any kind separates columns, and lines end as they like. Maps are named by their
-    place in the benchmark; here they are looked for by their base name beside the file.
+    Columns are separated by any white space, and lines may end in any way. Files name maps by their
+    path in the benchmark; here a map is the file of the same base name beside the queries.
 
     Parameters
     ----------
     path : path
-        Of voxels if it ends in ``.3dscen``.
+        Queries on voxels if it ends in ``.3dscen``.
 
     Raises
     ------
     FileFormatError
-        A file that is missing, of another version than 1, or a row that is no query.
+        A missing file, a version other than 1, or a row that is not a query.
 
     Examples
     --------
@@ -76,7 +76,7 @@ def _check_version(path: Path, lines: Iterator[tuple[int, str]]) -> None:
 
 
 def _query(path: Path, number: int, line: str) -> MovingAIQuery:
-    # From both sides: a map's name may hold spaces.
+    # Split from both sides: the name of a map may contain spaces.
     bucket, _, rest = line.replace("\t", " ").partition(" ")
     words = rest.rsplit(maxsplit=7)
     if len(words) != 8:

@@ -1,4 +1,4 @@
-"""Pose files, in the two forms that logs use.
+"""Readers of pose files, in the two forms that logs use.
 
 TUM
     ``timestamp tx ty tz qx qy qz qw`` [s, m], as written by most SLAM programs.
@@ -33,7 +33,7 @@ class Poses(NamedTuple):
 
     keys: npt.NDArray[Any]  #: shape (n,): timestamps [s] as float64, or ids as int64
     transforms: Floats  #: shape (n, 4, 4) [m, world]
-    lines: Ints  #: shape (n,), the one-based line each pose stood on
+    lines: Ints  #: shape (n,), the one-based line of each pose
 
 
 def read_tum(path: Path) -> Poses:
@@ -75,7 +75,7 @@ def read_gtsam(path: Path) -> Poses:
 
 
 def read_poses(path: Path) -> Poses:
-    """Read poses in either form, told apart by the number of columns."""
+    """Read poses in either form, which the number of columns determines."""
     return read_gtsam(path) if len(_first_row(path)) == 1 + 16 else read_tum(path)
 
 
@@ -85,7 +85,14 @@ def _first_row(path: Path) -> list[str]:
 
 
 def check_unique(path: Path, poses: Poses) -> None:
-    """Raise `FileFormatError` at the first pose whose key came before."""
+    """Raise `FileFormatError` at the first pose with a repeated key.
+
+    Parameters
+    ----------
+    path : Path
+        For the error message.
+    poses : Poses
+    """
     _, first, inverse = np.unique(poses.keys, return_index=True, return_inverse=True)
     repeated = np.flatnonzero(first[inverse] != np.arange(len(poses.keys)))
     if len(repeated):
@@ -95,7 +102,12 @@ def check_unique(path: Path, poses: Poses) -> None:
 
 
 def poses_by_id(path: Path, ids: Ints) -> Floats:
-    """Return the poses of those ids, shape (n, 4, 4); in TUM form timestamps are the ids.
+    """Return the poses of given ids, shape (n, 4, 4); in TUM form timestamps are the ids.
+
+    Parameters
+    ----------
+    path : Path
+    ids : ndarray of int, shape (n,)
 
     Raises
     ------
@@ -116,10 +128,16 @@ def poses_by_id(path: Path, ids: Ints) -> Floats:
 def poses_by_time(path: Path, timestamps: Floats) -> Floats:
     """Return the poses of views in order, shape (n, 4, 4); in GTSAM form ids are view indices.
 
+    Parameters
+    ----------
+    path : Path
+    timestamps : ndarray, shape (n,) [s]
+        Of the views.
+
     Raises
     ------
     FileFormatError
-        Another number of poses than views, or a timestamp off by more than 1 ms.
+        A number of poses other than that of the views, or a timestamp off by more than 1 ms.
     """
     poses = read_poses(path)
     if poses.keys.dtype.kind == "i":

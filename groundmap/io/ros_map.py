@@ -1,4 +1,4 @@
-"""Maps for Nav2's map_server: a ``.yaml`` file and a ``.pgm`` image."""
+"""Export of maps for Nav2's map_server: a ``.yaml`` file and a ``.pgm`` image."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from groundmap.grid.window import CellState
 from groundmap.io.dense import dense_window
 from groundmap.printable import is_plain
 
-# Contested cells are unknown to a planner, here as everywhere.
+# Contested cells are exported as unknown: planners treat both alike.
 GREYS = {
     CellState.UNKNOWN: 205,
     CellState.FREE: 254,
@@ -26,8 +26,8 @@ GREYS = {
     CellState.CONTESTED: 205,
 }
 OCCUPIED_THRESH = 0.65
-# map_server reads grey g as occupied with probability (255 - g) / 255, and as free below this
-# threshold: 205 is 0.19608, and with the customary 0.25 all unknown space would be free.
+# map_server reads grey g as an occupancy probability of (255 - g) / 255, and as free below this
+# threshold: 205 is 0.19608, so all unknown space would be free at the customary 0.25.
 FREE_THRESH = 0.196
 
 
@@ -36,24 +36,24 @@ def write_ros_map(
 ) -> None:
     """Write a 2-D map as ``NAME.yaml`` and ``NAME.pgm``, which map_server loads.
 
-    Occupied is 0, free 254, unknown and contested 205. Resolution and origin are written with
-    every digit: rounded to three, a hundred metres would be off by a third of one.
+    Occupied is 0, free 254, unknown and contested 205. Resolution and origin are written with all
+    digits: rounded to three decimals, they would shift a cell at 100 m by a third of a metre.
 
     Parameters
     ----------
     grid : ConfidenceGrid
     path : path
-        The ``.yaml`` file; the image goes beside it.
+        The ``.yaml`` file; the image is written beside it.
     bounds : array_like, shape (4,), optional
-        Part to write, xmin, ymin, xmax, ymax [m, map]; all that was seen unless told.
+        Part to write, xmin, ymin, xmax, ymax [m, map]; default: all observed cells.
 
     Raises
     ------
     InputError
-        An empty map, a 3-D one, bounds that are no box, a box with too many cells, or a file
-        name that is not UTF-8.
+        An empty or 3-D map, invalid bounds, a box with too many cells, or a file name that is not
+        UTF-8.
     OSError
-        The folder does not exist or can't be written to.
+        The folder does not exist or is not writable.
     """
     if grid.ndim != 2:
         raise InputError("grid", "a 2-D map", f"a {grid.ndim}-D one", hint="Export it as .npz.")
@@ -64,7 +64,7 @@ def write_ros_map(
         raise InputError("path", "a file name in UTF-8", repr(image.name))
     pgm = _pgm(window.states())
     text = _yaml(image.name, window.resolution, window.origin.tolist())
-    # The image first: a yaml file never names one that isn't there.
+    # The image first, so that the yaml file never names a missing image.
     write_atomically(image, lambda stream: stream.write(pgm))
     write_atomically(target, lambda stream: stream.write(text.encode()))
 

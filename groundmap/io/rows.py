@@ -1,4 +1,4 @@
-"""Tables of numbers in text files, read in chunks; errors name the line."""
+"""Reader of tables of numbers in text files, in chunks; errors name the line."""
 
 from __future__ import annotations
 
@@ -23,14 +23,21 @@ SEPARATORS = {None: "white space", ",": "commas", ";": "semicolons"}
 class Rows(NamedTuple):
     """Consecutive rows of a table."""
 
-    values: npt.NDArray[Any]  #: shape (n,), of the record type that was asked for
-    lines: Ints  #: shape (n,), the one-based line each row stood on
+    values: npt.NDArray[Any]  #: shape (n,), of the record type given to `read_rows`
+    lines: Ints  #: shape (n,), the one-based line of each row
 
 
 def record(integers: Sequence[str], numbers: int) -> np.dtype[Any]:
-    """Return the type of a row: named integer columns, then so many float64 ``values``.
+    """Return the type of a row: named integer columns, then an array ``values`` of float64.
 
-    Integers are kept apart because ids may use all of their 64 bits, which a float would round.
+    Integers are stored separately, because a float would round ids of more than 53 bits.
+
+    Parameters
+    ----------
+    integers : sequence of str
+        Names of the leading integer columns.
+    numbers : int
+        Number of the columns that follow.
 
     Examples
     --------
@@ -42,12 +49,12 @@ def record(integers: Sequence[str], numbers: int) -> np.dtype[Any]:
 
 @contextmanager
 def open_rows(path: str | PathLike[str]) -> Iterator[TextIO]:
-    """Open a text file, whatever bytes it holds; a byte order mark is passed over.
+    """Open a text file with any content; a byte order mark is skipped.
 
     Raises
     ------
     FileFormatError
-        There is no such file, or it can't be read.
+        The file is missing or not readable.
     """
     with open_text(path) as stream:
         try:
@@ -68,18 +75,18 @@ def read_rows(
     Parameters
     ----------
     path : path
-        Blank lines, and what follows a ``#``, are passed over.
+        Blank lines, and comments from ``#`` to the end of the line, are ignored.
     row : dtype
         Type of a row, see `record`.
     delimiter : str, optional
-        What separates columns; any white space unless told.
+        Separator of the columns; default: any white space.
     header : bool, default False
-        Whether the first line names the columns, and is no row.
+        Whether the first line contains the names of the columns.
 
     Raises
     ------
     FileFormatError
-        A line with another number of columns, or one that is not a number.
+        A line with a wrong number of columns, or with a column that is not a number.
     """
     with open_rows(path) as stream:
         first = 1
@@ -123,22 +130,22 @@ def _offence(
     row: np.dtype[Any],
     delimiter: str | None,
 ) -> FileFormatError:
-    """Find the first line that does not parse: slow, and only done when one is known to be."""
+    """Return the error for the first line that does not parse; slow, for failures only."""
     first = next(i for i, line in enumerate(text) if not _parses(line, row, delimiter))
     line, integers = text[first], len(row.names or ()) - 1
-    expected, found = integers + row["values"].shape[0], len(line.split(delimiter))
+    expected, got = integers + row["values"].shape[0], len(line.split(delimiter))
     number, hint = int(lines[first]), _hint(line, expected, delimiter)
-    if found != expected:
-        if not hint and found < expected:
+    if got != expected:
+        if not hint and got < expected:
             hint = "Was the file cut short?"
-        return FileFormatError(path, f"{expected} columns", str(found), line=number, hint=hint)
+        return FileFormatError(path, f"{expected} columns", str(got), line=number, hint=hint)
     leading = f", the first {integers} integers" if integers else ""
     shown = repr(line[:SHOWN_CHARACTERS])
     return FileFormatError(path, f"{expected} numbers{leading}", shown, line=number, hint=hint)
 
 
 def _hint(line: str, expected: int, delimiter: str | None) -> str:
-    """Return what to do about a row with another separator, or with decimal commas; else ''."""
+    """Return a hint for a row with another separator or with decimal commas; else ''."""
     wanted = SEPARATORS.get(delimiter, repr(delimiter))
     for separator, name in SEPARATORS.items():
         if separator != delimiter and len(line.split(separator)) == expected:

@@ -1,4 +1,4 @@
-"""Rows that come in the order of their views: check that they do, and cut them into views."""
+"""Rows sorted by view: a check of their order, and a split into views."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from groundmap.arrays import Ints
 
 
 class Wrong(NamedTuple):
-    """The first row that does not belong where it stands."""
+    """The first row in a wrong place."""
 
     row: int
     expected: str
@@ -21,7 +21,16 @@ class Wrong(NamedTuple):
 
 
 def first_wrong(column: Ints, last: int, views: int) -> Wrong | None:
-    """Return the first view index that is out of range or below the one before it.
+    """Return the first view index that is out of range or below the previous one, or None.
+
+    Parameters
+    ----------
+    column : ndarray of int, shape (n,)
+        View of each row.
+    last : int
+        View of the row before the first.
+    views : int
+        Number of views.
 
     Examples
     --------
@@ -37,7 +46,7 @@ hint='Sort the rows by view.')
     row = int(wrong[0])
     if outside[row]:
         expected = f"a view from 0 to {views - 1}"
-        return Wrong(row, expected, str(column[row]), "It is the row of poses.txt, from 0.")
+        return Wrong(row, expected, str(column[row]), "It is the row in poses.txt, counted from 0.")
     got = f"view {column[row]} after view {before[row]}"
     return Wrong(row, "views in ascending order", got, "Sort the rows by view.")
 
@@ -45,7 +54,17 @@ hint='Sort the rows by view.')
 def split_by_view(
     chunks: Iterable[npt.NDArray[Any]], views: int, row: np.dtype[Any]
 ) -> Iterator[npt.NDArray[Any]]:
-    """Cut ascending rows into one array per view, across the borders of the chunks."""
+    """Split sorted rows into one array per view, across the borders of chunks.
+
+    Parameters
+    ----------
+    chunks : iterable of ndarray
+        Of type `row`.
+    views : int
+        Number of views.
+    row : dtype
+        With a field ``view``.
+    """
     pending = [np.empty(0, dtype=row)]
     view = 0
     for chunk in chunks:

@@ -1,4 +1,4 @@
-"""Worlds that are known, and a stereo sensor that sees them: the ground truth that logs lack."""
+"""Simulated worlds with ground truth, and a stereo sensor that observes them."""
 
 from groundmap.simulate.drive import Drive, DriveSettings, drive
 from groundmap.simulate.landmarks import Landmarks, sample_landmarks

@@ -1,4 +1,4 @@
-"""A drive: the poses that views are taken from, and how wrong the log has them."""
+"""A drive: the true poses of the views, and those of the log, with noise and drift."""
 
 from __future__ import annotations
 
@@ -13,41 +13,46 @@ from groundmap.errors import InputError
 from groundmap.settings import Settings
 from groundmap.simulate.world import FARTHEST
 
-MOST_VIEWS = 100_000  # of a drive: more is a distance in the wrong unit
+MOST_VIEWS = 100_000  # of a drive; more indicates a wrong unit
 
 
 class DriveSettings(Settings):
-    """Where the robot goes, and how well the log knows it."""
+    """The stops of a drive, and the errors of its logged poses."""
 
     stops: tuple[tuple[float, float, float], ...] = Field(
-        min_length=1, description="x, y [m, map] and yaw [deg]; it turns the shorter way"
+        min_length=1, description="x, y [m, map] and yaw [deg]; turns take the shorter way"
     )
-    every: float = Field(1.0, gt=0, description="it takes a view at least this often [m]")
-    every_turn: float = Field(0.5, gt=0, description="and at least this often in turns [rad]")
+    every: float = Field(1.0, gt=0, description="largest distance between views [m]")
+    every_turn: float = Field(0.5, gt=0, description="largest turn between views [rad]")
     seconds_per_view: float = Field(1.0, gt=0, description="time between views [s]")
     position_noise: float = Field(
         0.0, ge=0, description="standard deviation of each pose's x and y [m]"
     )
     yaw_noise: float = Field(0.0, ge=0, description="standard deviation of each pose's yaw [rad]")
-    drift: float = Field(0.0, description="scale by which the log overstates the way driven")
-    yaw_drift: float = Field(0.0, description="turn of the log per way driven [rad/m]")
+    drift: float = Field(0.0, description="relative error of the logged distances")
+    yaw_drift: float = Field(0.0, description="error of the logged yaw per distance [rad/m]")
 
 
 class Drive(NamedTuple):
     """Poses of ``base_link``, shape (n, 4, 4) [map]."""
 
     true: Floats
-    logged: Floats  #: as the log has them
+    logged: Floats  #: as logged, with noise and drift
     times: Floats  #: shape (n,) [s]
 
 
 def drive(settings: DriveSettings, rng: np.random.Generator) -> Drive:
-    """Return the poses of a drive from stop to stop, straight and at a steady pace.
+    """Return the poses of a drive from stop to stop, along straight lines at constant speed.
+
+    Parameters
+    ----------
+    settings : DriveSettings
+    rng : numpy Generator
 
     Raises
     ------
     InputError
-        A stop that is not finite or more than 1e8 m off, or more than 100,000 views.
+        A stop that is not finite or farther than 1e8 m from the origin; more than 100,000 views.
 
     Examples
     --------
@@ -84,16 +89,16 @@ def _along(settings: DriveSettings) -> Floats:
         raise InputError("stops", f"places within {FARTHEST:g} m of the origin", f"{farthest:g} m")
     stops = np.column_stack([stops[:, :2], np.unwrap(np.radians(stops[:, 2]))])
     moves = np.diff(stops, axis=0)
-    with np.errstate(over="ignore"):  # what is too far is refused below
+    with np.errstate(over="ignore"):  # too long drives are refused below
         lengths = np.hypot(moves[:, 0], moves[:, 1]) / settings.every
         turns = np.abs(moves[:, 2]) / settings.every_turn
     steps = np.maximum(np.ceil(np.maximum(lengths, turns)), 1.0)
     if not steps.sum() <= MOST_VIEWS:
         raise InputError(
             "stops",
-            f"a drive of {MOST_VIEWS:g} views at most",
+            f"a drive of at most {MOST_VIEWS:g} views",
             f"{steps.sum():.3g}",
-            hint="Take stops nearer to each other, or larger every [m] and every_turn [rad].",
+            hint="Give closer stops, or larger values of every [m] and every_turn [rad].",
         )
     counts = steps.astype(np.int64)
     poses = [
@@ -104,7 +109,7 @@ def _along(settings: DriveSettings) -> Floats:
 
 
 def _add_drift(poses: Floats, settings: DriveSettings) -> Floats:
-    """Chain the moves anew, each stretched and turned: what odometry does."""
+    """Return the poses with each move scaled and rotated, as the drift of odometry does."""
     moves = np.diff(poses, axis=0)
     driven = np.cumsum([0.0, *np.hypot(moves[:, 0], moves[:, 1])])
     turn = settings.yaw_drift * driven

@@ -1,4 +1,4 @@
-"""Landmarks: what a matcher could find in a world, strewn over its surfaces, edges and ground."""
+"""Landmarks: the features of a world, on its surfaces, edges and ground."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from groundmap.errors import InputError
 from groundmap.simulate.occlusion import edges_of
 from groundmap.simulate.world import Hole, Solid, World
 
-GROUND = -1  # the owner of what belongs to no solid
-OFF = 1e-6  # [m], landmarks stand off their surface, so that it doesn't hide them
-MOST = 1e6  # landmarks of a world: more is a size or a density in the wrong unit
-SHORTEST, LONGEST = 0.3, 1.2  # [m], of a segment
+GROUND = -1  # owner of the landmarks of the ground and its holes
+OFF = 1e-6  # [m], distance of landmarks from their surface, so that it does not hide them
+MOST = 1e6  # landmarks of a world; more indicates a size or a density in a wrong unit
+SHORTEST, LONGEST = 0.3, 1.2  # [m], lengths of segments
 
 
 class LandmarkSet(NamedTuple):
-    """Landmarks of one kind, where they are at time 0."""
+    """Landmarks of one kind, at their places at time 0."""
 
     xyz: Floats  #: shape (n, 3) [m, map] of points, (n, 2, 3) of segments
     owner: Ints  #: shape (n,), the solid that carries it; -1 for the ground and its holes
@@ -49,15 +49,16 @@ class _Face(NamedTuple):
 
 
 def sample_landmarks(world: World, rng: np.random.Generator) -> Landmarks:
-    """Strew landmarks over a world, as densely as its solids and its ground say.
+    """Sample the landmarks of a world, in the densities of its solids and its ground.
 
-    Points fall on upright faces, on tops and on the ground, at random; segments likewise, and
-    along the upper and upright edges of the solids that have `edges`, in pieces of 1.2 m at most.
+    Points are sampled uniformly on upright faces, on tops and on the ground. Segments are sampled
+    on upright faces and on the ground, and placed along the upper and upright edges of the solids
+    that have `edges`, in pieces of at most 1.2 m.
 
     Parameters
     ----------
     world : World
-        The moving and the passing are strewn, too: `present_at` tells who is there.
+        Landmarks are also placed on moving and temporary solids; see `present_at`.
     rng : numpy Generator
 
     Raises
@@ -68,8 +69,8 @@ def sample_landmarks(world: World, rng: np.random.Generator) -> Landmarks:
     Examples
     --------
     >>> world = World(bounds=(0, 0, 10, 10), solids=(Solid(shapely.box(4, 4, 5, 5), top=1.0),))
-    >>> found = sample_landmarks(world, np.random.default_rng(1))
-    >>> len(found.points), len(found.segments)
+    >>> landmarks = sample_landmarks(world, np.random.default_rng(1))
+    >>> len(landmarks.points), len(landmarks.segments)
     (641, 8)
     """
     _check_number(world)
@@ -77,7 +78,7 @@ def sample_landmarks(world: World, rng: np.random.Generator) -> Landmarks:
     for solid in world.solids:
         points.append(np.concatenate([_on_faces(solid, rng), _on_top(solid, rng)]))
         segments.append(np.concatenate([_lines_on_faces(solid, rng), _edges(solid)]))
-    return Landmarks(_marks(points), _marks(segments))
+    return Landmarks(_join(points), _join(segments))
 
 
 def _check_number(world: World) -> None:
@@ -91,26 +92,38 @@ def _check_number(world: World) -> None:
     if count > MOST:
         raise InputError(
             "world",
-            f"{MOST:g} landmarks at most",
+            f"at most {MOST:g} landmarks",
             f"{count:.3g}",
             hint="Give smaller bounds [m], or less texture [1/m²].",
         )
 
 
-def _marks(parts: list[Floats]) -> LandmarkSet:
-    """Join the landmarks of the ground, which come first, and of each solid."""
+def _join(parts: list[Floats]) -> LandmarkSet:
+    """Join the landmarks of the ground, which come first, and those of each solid."""
     owners = np.repeat(np.arange(len(parts)) + GROUND, [len(part) for part in parts])
     return LandmarkSet(np.concatenate(parts), owners)
 
 
 def present_at(marks: LandmarkSet, world: World, time: float) -> tuple[Floats, Bools]:
-    """Return where landmarks are at a time [s], and which of them are there."""
+    """Return the places of landmarks at a time, and which of them exist then.
+
+    Parameters
+    ----------
+    marks : LandmarkSet
+    world : World
+    time : float [s]
+
+    Returns
+    -------
+    xyz : ndarray, shape of ``marks.xyz`` [m, map]
+    present : ndarray of bool, shape (n,)
+    """
     shifts = np.array([(0.0, 0.0), *(solid.shift(time) for solid in world.solids)])
-    there = np.array([True, *(solid.is_there(time) for solid in world.solids)])
+    present = np.array([True, *(solid.is_there(time) for solid in world.solids)])
     row = marks.owner + 1  # the ground comes first
     xyz = marks.xyz.copy()
     xyz[..., :2] += shifts[row].reshape(-1, *(1,) * (xyz.ndim - 2), 2)
-    return xyz, there[row]
+    return xyz, present[row]
 
 
 def _on_ground(world: World, rng: np.random.Generator) -> Floats:
@@ -125,7 +138,7 @@ def _on_ground(world: World, rng: np.random.Generator) -> Floats:
 
 
 def _hole_faces(hole: Hole) -> Iterator[_Face]:
-    """Yield the walls of a hole, which face inwards."""
+    """Yield the walls of a hole; they face inwards."""
     for edge in edges_of(hole.outline):
         along = np.array([*(edge[2:] - edge[:2]), 0.0])
         inwards = OFF * np.array([-along[1], along[0], 0.0]) / np.linalg.norm(along)
@@ -156,9 +169,9 @@ def _in_bounds(world: World, count: int, rng: np.random.Generator) -> Floats:
 
 
 def _faces(solid: Solid) -> Iterator[_Face]:
-    """Yield the upright faces of a solid, a hair in front of it.
+    """Yield the upright faces of a solid, moved `OFF` outwards.
 
-    The exterior runs counter-clockwise and holes clockwise: outside is always to the right.
+    The exterior runs counter-clockwise and holes clockwise: the outside is always on the right.
     """
     up = np.array([0.0, 0.0, solid.top - solid.bottom])
     for edge in edges_of(solid.outline):
@@ -182,8 +195,8 @@ def _on_top(solid: Solid, rng: np.random.Generator) -> Floats:
     xmin, ymin, xmax, ymax = solid.outline.bounds
     count = rng.poisson(solid.texture * (xmax - xmin) * (ymax - ymin))
     places = rng.uniform((xmin, ymin), (xmax, ymax), (count, 2))
-    on_it = places[shapely.contains_xy(solid.outline, places)]
-    return np.column_stack([on_it, np.full(len(on_it), solid.top + OFF)])
+    on_top = places[shapely.contains_xy(solid.outline, places)]
+    return np.column_stack([on_top, np.full(len(on_top), solid.top + OFF)])
 
 
 def _lines_on_faces(solid: Solid, rng: np.random.Generator) -> Floats:
@@ -199,7 +212,7 @@ def _lines_on_faces(solid: Solid, rng: np.random.Generator) -> Floats:
 def _strokes(
     corner: Floats, way: Floats, across: Floats, mean: float, rng: np.random.Generator
 ) -> Floats:
-    """Strew segments that run along `way` over a face."""
+    """Sample segments in the direction `way` on a face."""
     count = rng.poisson(mean)
     length = rng.uniform(SHORTEST, LONGEST, count)
     share = np.minimum(length / np.linalg.norm(way), 1.0)
@@ -209,7 +222,7 @@ def _strokes(
 
 
 def _edges(solid: Solid) -> Floats:
-    """Return the upper and the upright edges of a solid, cut into pieces of one length."""
+    """Return the upper and the upright edges of a solid, each cut into equal pieces."""
     if not solid.edges:
         return np.empty((0, 2, 3))
     ways = [(face.corner + face.up, face.along) for face in _faces(solid)]

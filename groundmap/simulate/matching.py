@@ -1,4 +1,4 @@
-"""What a stereo matcher makes of what is in sight: noise, gaps, false matches, broken segments."""
+"""The errors of a stereo matcher: noise, gaps, false matches, ghosts, broken segments."""
 
 from __future__ import annotations
 
@@ -10,30 +10,35 @@ from groundmap.errors import SettingsError
 from groundmap.settings import Settings
 
 UL, UR = 0, 1  # columns of a matched pixel; the third is v
-GAP = 0.1  # of a broken segment's length
+GAP = 0.1  # of the length of a broken segment
 
 
 class MatchingSettings(Settings):
-    """How good the matcher is; all rates are shares of the features in sight, 0 to 1."""
+    """The errors of the matcher; all rates are shares of the features in sight, 0 to 1."""
 
     pixel_noise_px: float = Field(
         0.5, ge=0, description="standard deviation of a matched coordinate [px]"
     )
     quantum_px: float = Field(0.0, ge=0, description="step of the disparity; 0 for none [px]")
-    missing: float = Field(0.1, ge=0, le=1, description="not matched at all")
-    false_matches: float = Field(0.02, ge=0, le=1, description="matched with any disparity")
+    missing: float = Field(0.1, ge=0, le=1, description="share not matched")
+    false_matches: float = Field(
+        0.02, ge=0, le=1, description="share matched with a random disparity"
+    )
     false_disparity_px: tuple[float, float] = Field(
-        (5.0, 120.0), description="disparities of false matches, from and to [px]"
+        (5.0, 120.0), description="least and largest disparity of false matches [px]"
     )
     ghosts: float = Field(
-        0.0, ge=0, le=1, description="of features of a repeated pattern: matched one piece off"
+        0.0,
+        ge=0,
+        le=1,
+        description="share matched one period off, of features of a repeated pattern",
     )
     fragments: float = Field(
-        0.0, ge=0, le=1, description="of segments: broken in two, with a gap between"
+        0.0, ge=0, le=1, description="share of segments broken in two, with a gap between them"
     )
 
     def check(self) -> None:
-        """Refuse disparities of false matches out of order."""
+        """Refuse disparities of false matches that are not in ascending order."""
         low, high = self.false_disparity_px
         if low > high:
             expected = "two disparities in ascending order [px]"
@@ -43,14 +48,14 @@ class MatchingSettings(Settings):
 def match(
     pixels: Floats, period_px: Floats, settings: MatchingSettings, rng: np.random.Generator
 ) -> tuple[Floats, Bools]:
-    """Return features as matched, and which of them are.
+    """Return the matched pixels of features, and which features are matched.
 
     Parameters
     ----------
     pixels : ndarray, shape (n, ends, 3) [px]
-        (uL, uR, v) as they truly are.
+        True (uL, uR, v).
     period_px : ndarray, shape (n,) [px]
-        How far apart the pieces of a repeated pattern are in the images; 0 for no pattern.
+        Period of a repeated pattern in the images; 0 for no pattern.
     settings : MatchingSettings
     rng : numpy Generator
 
@@ -61,8 +66,8 @@ def match(
 
     Notes
     -----
-    A ghost is one pattern too near or too far with all the features around it, so that it looks
-    like a surface; what it would put behind infinity is not matched.
+    A ghost is off by one period, too near or too far, with all features around it, so that it looks
+    like a surface. Ghosts beyond infinity have no disparity and are not matched.
     """
     count = len(pixels)
     matched = pixels + rng.normal(size=pixels.shape) * settings.pixel_noise_px
@@ -70,9 +75,9 @@ def match(
     side = np.where(rng.random(count) < 0.5, 1.0, -1.0)
     matched[:, :, UR] += np.where(ghost, side * period_px, 0.0)[:, None]
     wrong = rng.random(count) < settings.false_matches
-    anything = rng.uniform(*settings.false_disparity_px, count)
+    disparities = rng.uniform(*settings.false_disparity_px, count)
     matched[:, :, UR] = np.where(
-        wrong[:, None], matched[:, :, UL] - anything[:, None], matched[:, :, UR]
+        wrong[:, None], matched[:, :, UL] - disparities[:, None], matched[:, :, UR]
     )
     if settings.quantum_px > 0:
         disparity = matched[:, :, UL] - matched[:, :, UR]
@@ -85,19 +90,21 @@ def match(
 def break_segments(
     segments: Floats, settings: MatchingSettings, rng: np.random.Generator
 ) -> tuple[Floats, Ints]:
-    """Break some segments in two, each with a gap of a tenth of it at a random place.
+    """Break some segments in two, with a gap of a tenth of their length at a random place.
 
     Parameters
     ----------
     segments : ndarray, shape (n, 2, 3) [px]
         Matched ends; pixels and disparity are linear along a segment.
+    settings : MatchingSettings
+    rng : numpy Generator
 
     Returns
     -------
     pieces : ndarray, shape (m, 2, 3) [px], m >= n
-        Those left whole come first.
+        Unbroken segments come first.
     row : ndarray, shape (m,)
-        The segment that each is a piece of.
+        Index of the segment of each piece.
     """
     breaks = rng.random(len(segments)) < settings.fragments
     first, last = np.moveaxis(segments[breaks], 1, 0)

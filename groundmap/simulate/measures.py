@@ -1,4 +1,4 @@
-"""Measures of a map against the truth."""
+"""Measures of a map relative to the ground truth."""
 
 from __future__ import annotations
 
@@ -14,29 +14,31 @@ from groundmap.evaluate.held_out import NEAR, cells_around, near_nonfree
 from groundmap.grid.window import CellState, GridWindow
 from groundmap.simulate.truth import HAIR, Truth
 
-JUDGED_RANGE = 10.0  # [m], boundaries farther from every viewpoint are not judged
+JUDGED_RANGE = 10.0  # [m], farther boundaries are not measured
 
 
 @dataclass(frozen=True)
 class Measures:
-    """How a map compares with the truth; shares are 0 to 1, None is the share of nothing.
+    """The agreement of a map with the truth; shares are 0 to 1, None for a share of an empty set.
 
-    What the map says is judged where it could know: on visible cells and on those that hold a
-    surface in sight. Only `false_free` looks at all free cells of the map.
+    Maps are compared on observable cells: visible cells, and cells with a surface in sight. Only
+    the ``false_free`` measures take all free cells of the map into account.
     """
 
-    free_recall: float | None  #: of truly free visible cells: free on the map
-    free_precision: float | None  #: of free cells: truly free
-    nonfree_recall: float | None  #: of surfaces in sight: within 0.3 m of a non-free cell
-    nonfree_precision: float | None  #: of non-free cells: within 0.3 m of an obstacle
-    false_free: float | None  #: of all free cells: in an obstacle, or behind one in every view
-    false_free_beyond_cell: float | None  #: those more than a cell from where free is right
-    false_free_beyond: float | None  #: those more than 0.3 m from where free is right
-    false_free_depth: float | None  #: the farthest of them from where free is right [m]
-    boundary_mean: float | None  #: from mapped borders within 10 m of a view to the surface [m]
-    boundary_p95: float | None  #: the same, 95 % [m]
-    unknown: float | None  #: of truly free visible cells: unknown or contested
-    visible_m2: float  #: truly free and visible
+    free_recall: float | None  #: share free on the map, of truly free visible cells
+    free_precision: float | None  #: share truly free, of free cells
+    nonfree_recall: float | None  #: share within 0.3 m of a non-free cell, of surfaces in sight
+    nonfree_precision: float | None  #: share within 0.3 m of an obstacle, of non-free cells
+    false_free: (
+        float | None
+    )  #: share in an obstacle, or behind one in every view, of all free cells
+    false_free_beyond_cell: float | None  #: of these, deeper than a cell
+    false_free_beyond: float | None  #: of these, deeper than 0.3 m
+    false_free_depth: float | None  #: largest distance from the nearest cell that may be free [m]
+    boundary_mean: float | None  #: mean error of borders within 10 m of a view [m]
+    boundary_p95: float | None  #: its 95th percentile [m]
+    unknown: float | None  #: share unknown or contested, of truly free visible cells
+    visible_m2: float  #: area truly free and visible [m²]
 
 
 def measure(window: GridWindow, truth: Truth) -> Measures:
@@ -45,7 +47,7 @@ def measure(window: GridWindow, truth: Truth) -> Measures:
     Parameters
     ----------
     window : GridWindow
-        The map, on the cells that the truth is about.
+        The map, on the cells of the truth.
     truth : Truth
     """
     states = window.states()
@@ -88,12 +90,13 @@ def _cells_holding(window: GridWindow, points: Floats) -> Bools:
 
 
 def _depths(window: GridWindow, truth: Truth) -> Floats:
-    """Return how far each cell is from where free is right, (rows, cols) [m].
+    """Return the depth of each cell in space that must not be free, (rows, cols) [m].
 
-    From its centre to the border of the nearest cell that is truly free and in line of a view.
+    The distance from its centre to the border of the nearest cell that is truly free and in the
+    line of sight of a view.
     """
     wrong = truth.nonfree | ~truth.in_line
-    if wrong.all():  # the transform has nothing to measure to
+    if wrong.all():  # the transform needs a target
         return np.full(wrong.shape, np.inf)
     centre_to_centre = distance_transform_edt(wrong, sampling=window.resolution)
     depths: Floats = np.maximum(centre_to_centre - 0.5 * window.resolution, 0.0)
@@ -111,9 +114,9 @@ def _to_obstacles(window: GridWindow, cells: Bools, truth: Truth) -> Floats:
 
 
 def _borders(window: GridWindow, nonfree: Bools, free: Bools, truth: Truth) -> Floats:
-    """Return how far the mapped borders between free and non-free are off the true surface [m].
+    """Return the distances of mapped borders between free and non-free to true surfaces [m].
 
-    For each non-free cell beside a free one, within 10 m of a viewpoint: from its centre.
+    Measured from the centre of each non-free cell beside a free one, within 10 m of a viewpoint.
     """
     beside = nonfree & binary_dilation(free)
     centres = window.cell_to_world(np.argwhere(beside))

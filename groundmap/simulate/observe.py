@@ -1,4 +1,4 @@
-"""Observing a world: the views of a drive, as the log of a stereo sensor would have them."""
+"""Observation of a world: the views of a drive, as a stereo sensor would log them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from groundmap.simulate.sensor import SensorSettings
 from groundmap.simulate.world import World
 from groundmap.view.view import View
 
-PLACES = 9  # along a segment that are looked at, to find the piece of it in sight
+PLACES = 9  # points along a segment that are tested to find its visible piece
 
 
 class _Seen(NamedTuple):
@@ -29,7 +29,7 @@ class _Seen(NamedTuple):
 def observe(
     world: World, landmarks: Landmarks, moves: Drive, settings: SensorSettings, *, seed: int
 ) -> Iterator[View]:
-    """Yield the views of a drive, one per pose, with the poses that the log has.
+    """Yield the views of a drive, one per pose, with the logged poses.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def observe(
     moves : Drive
     settings : SensorSettings
     seed : int
-        Each view has random numbers of its own, so that views don't depend on each other.
+        Each view has its own random numbers, so that views do not depend on each other.
 
     Notes
     -----
@@ -49,21 +49,19 @@ def observe(
         rng = np.random.default_rng((seed, number))
         scene = _Scene(world, pose, time, settings)
         points = _some_of(scene.points(landmarks.points), settings.max_points, rng)
-        matched, found = match(
-            points.pixels, scene.periods(points, landmarks.points), settings, rng
-        )
+        matched, kept = match(points.pixels, scene.periods(points, landmarks.points), settings, rng)
         strokes = _some_of(scene.segments(landmarks.segments), settings.max_segments, rng)
-        lines, lines_found = match(
+        lines, lines_kept = match(
             strokes.pixels, scene.periods(strokes, landmarks.segments), settings, rng
         )
-        pieces, row = break_segments(lines[lines_found], settings, rng)
+        pieces, row = break_segments(lines[lines_kept], settings, rng)
         yield View.from_pixels(
             logged,
             settings.rig,
-            points_px=matched[found, 0],
-            point_ids=points.ids[found],
+            points_px=matched[kept, 0],
+            point_ids=points.ids[kept],
             segments_px=pieces,
-            segment_ids=strokes.ids[lines_found][row] + len(landmarks.points),
+            segment_ids=strokes.ids[lines_kept][row] + len(landmarks.points),
             timestamp=time,
         )
 
@@ -78,17 +76,17 @@ class _Scene:
 
     def points(self, marks: LandmarkSet) -> _Seen:
         """Return the point landmarks in sight."""
-        xyz, there = present_at(marks, self.world, self.time)
-        pixels, seen = self._look(xyz, there)
+        xyz, present = present_at(marks, self.world, self.time)
+        pixels, seen = self._look(xyz, present)
         ids = np.flatnonzero(seen)
         return _Seen(pixels[ids, None], ids)
 
     def segments(self, marks: LandmarkSet) -> _Seen:
-        """Return the segment landmarks in sight: of each, its longest piece that is."""
-        xyz, there = present_at(marks, self.world, self.time)
+        """Return the segment landmarks in sight: the longest visible piece of each."""
+        xyz, present = present_at(marks, self.world, self.time)
         share = np.linspace(0.0, 1.0, PLACES)[:, None]
         places = xyz[:, :1] * (1.0 - share) + xyz[:, 1:] * share
-        _, seen = self._look(places.reshape(-1, 3), np.repeat(there, PLACES))
+        _, seen = self._look(places.reshape(-1, 3), np.repeat(present, PLACES))
         start, length = _longest_runs(seen.reshape(-1, PLACES))
         ids = np.flatnonzero(length > 1)
         ends = np.stack([start[ids], start[ids] + length[ids] - 1], axis=1)
@@ -97,19 +95,24 @@ class _Scene:
         return _Seen(pixels.reshape(-1, 2, 3), ids)
 
     def periods(self, seen: _Seen, marks: LandmarkSet) -> Floats:
-        """Return how far apart the pieces of repeated patterns are in the images, (n,) [px].
+        """Return the periods of repeated patterns in the images, (n,) [px]; 0 for no pattern.
 
-        As if the pattern were seen face on; 0 where there is none.
+        The patterns are assumed to face the camera.
+
+        Parameters
+        ----------
+        seen : _Seen
+        marks : LandmarkSet
         """
         repeats = np.array([0.0, *(solid.repeat for solid in self.world.solids)])
         disparity_px = (seen.pixels[..., 0] - seen.pixels[..., 1]).mean(axis=1)
         periods: Floats = repeats[marks.owner[seen.ids] + 1] * disparity_px / self.settings.baseline
         return periods
 
-    def _look(self, places: Floats, there: Bools) -> tuple[Floats, Bools]:
-        """Return the pixels of places and which of them are in both images, with nothing before."""
+    def _look(self, places: Floats, present: Bools) -> tuple[Floats, Bools]:
+        """Return the pixels of places, and which of them are visible in both images."""
         pixels, seen = self.settings.project(self.pose, places)
-        rows = np.flatnonzero(seen & there)
+        rows = np.flatnonzero(seen & present)
         seen[:] = False
         seen[rows] = in_sight(self.now, self.eye, places[rows])
         return pixels, seen
@@ -123,7 +126,7 @@ def _some_of(seen: _Seen, most: int, rng: np.random.Generator) -> _Seen:
 
 
 def _longest_runs(seen: Bools) -> tuple[Ints, Ints]:
-    """Return start and length of the longest run of True in each row; of length 0 for none."""
+    """Return start and length of the longest run of True in each row; length 0 if none."""
     run = np.zeros(len(seen), dtype=np.int64)
     best, start = np.zeros_like(run), np.zeros_like(run)
     for place in range(seen.shape[1]):

@@ -1,4 +1,4 @@
-"""Who sees what in a world at one moment."""
+"""Visibility in a world at one time."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from groundmap.arrays import Bools, Floats, Ints
 from groundmap.simulate.kernels.occlusion import find_hidden
 from groundmap.simulate.world import Hole, World
 
-GROUND_LEVEL = 0.0  # [m], where sight along the ground runs
+GROUND_LEVEL = 0.0  # [m], height of lines of sight along the ground
 
 
 class Prisms(NamedTuple):
-    """Footprints with heights as the kernels read them."""
+    """Footprints with heights, as arrays for the kernels."""
 
     edges: Floats  #: shape (e, 4) [m, map], x0, y0, x1, y1
     starts: Ints  #: shape (p + 1,), first edge of each prism
@@ -24,7 +24,7 @@ class Prisms(NamedTuple):
 
 
 def opaque_prisms(world: World) -> Prisms:
-    """Return all that hides: every solid but glass. The world is at rest, as `World.at` gives it.
+    """Return the opaque solids of a world at rest, as `World.at` returns it.
 
     Examples
     --------
@@ -40,13 +40,13 @@ def opaque_prisms(world: World) -> Prisms:
 
 
 def ground_level_prisms(obstacles: shapely.Geometry) -> Prisms:
-    """Return what ends sight along the ground, whatever its height, from `World.obstacles`."""
+    """Return prisms that end sight along the ground, from `World.obstacles`."""
     outlines = list(shapely.get_parts(obstacles))
     return _prisms(outlines, [(GROUND_LEVEL - 1.0, GROUND_LEVEL + 1.0)] * len(outlines))
 
 
 def edges_of(outline: shapely.Geometry) -> Floats:
-    """Return the edges of all rings of one polygon or several, shape (e, 4): x0, y0, x1, y1."""
+    """Return the edges of all rings of polygons, shape (e, 4): x0, y0, x1, y1."""
     rings = shapely.get_rings(shapely.get_parts(outline))
     corners = [shapely.get_coordinates(ring) for ring in rings]
     pieces = [np.hstack([ring[:-1], ring[1:]]) for ring in corners]
@@ -54,16 +54,30 @@ def edges_of(outline: shapely.Geometry) -> Floats:
 
 
 def find_visible(prisms: Prisms, eye: Floats, targets: Floats) -> Bools:
-    """Return which targets, shape (n, 3) [m, map], no prism hides from the eye."""
+    """Return which targets are not hidden by a prism, shape (n,).
+
+    Parameters
+    ----------
+    prisms : Prisms
+    eye : ndarray, shape (3,) [m, map]
+    targets : ndarray, shape (n, 3) [m, map]
+    """
     out = np.empty(len(targets), dtype=np.bool_)
     find_hidden(np.ascontiguousarray(eye), np.ascontiguousarray(targets), *prisms, out)
     return ~out
 
 
 def in_sight(world: World, eye: Floats, targets: Floats) -> Bools:
-    """Return which targets, shape (n, 3) [m, map], can be seen from the eye, shape (3,).
+    """Return which targets are visible, shape (n,).
 
-    The world is at rest. Targets below the ground are seen through the mouth of their hole.
+    Targets below the ground are visible through the mouth of their hole.
+
+    Parameters
+    ----------
+    world : World
+        At rest, as `World.at` returns it.
+    eye : ndarray, shape (3,) [m, map]
+    targets : ndarray, shape (n, 3) [m, map]
     """
     seen = find_visible(opaque_prisms(world), eye, targets)
     below = np.flatnonzero(seen & (targets[:, 2] < 0))
@@ -72,8 +86,8 @@ def in_sight(world: World, eye: Floats, targets: Floats) -> Bools:
 
 
 def _through_mouths(holes: Iterable[Hole], eye: Floats, targets: Floats) -> Bools:
-    """Return which targets below the ground have nothing but a hole above their line of sight."""
-    share = eye[2] / (eye[2] - targets[:, 2])  # where sight passes the ground's level
+    """Return which targets below the ground have only a hole above their line of sight."""
+    share = eye[2] / (eye[2] - targets[:, 2])  # where sight crosses the level of the ground
     entry = eye[:2] + share[:, None] * (targets[:, :2] - eye[:2])
     lines = shapely.linestrings(np.stack([entry, targets[:, :2]], axis=1))
     seen = np.zeros(len(targets), dtype=np.bool_)

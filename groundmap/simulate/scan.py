@@ -1,4 +1,4 @@
-"""An ideal sensor, against which all others are measured: no noise, nothing missing."""
+"""An ideal sensor without noise or missing features, as a reference for others."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from groundmap.view.frames import invert
 from groundmap.view.view import Features, View
 
 MOST = 5e6  # features of a view
-SIGMA = 1e-6  # [m], of every feature
+SIGMA = 1e-6  # [m], standard deviation of every feature
 
 
 class ScanSettings(Settings):
-    """How densely the ideal sensor sees."""
+    """The density of the features of the ideal sensor."""
 
-    bearing: float = Field(0.1, gt=0, description="between features on obstacles [deg]")
-    ground: float = Field(0.1, gt=0, description="between features on the ground [m]")
+    bearing: float = Field(0.1, gt=0, description="step between features on obstacles [deg]")
+    ground: float = Field(0.1, gt=0, description="step between features on the ground [m]")
 
 
 def scan(
@@ -40,18 +40,18 @@ def scan(
 ) -> Iterator[View]:
     """Yield the views of an ideal sensor.
 
-    Each has a point on the nearest obstacle at every step of bearing, halfway between the step
-    and the robot's height, and points on a lattice on the ground in sight.
+    Each view has a point on the nearest obstacle at every step of bearing, halfway between
+    ``step_height`` and ``robot_height``, and points on a lattice on the visible ground.
 
     Parameters
     ----------
     world : World
     moves : Drive
     sensor : SensorSettings
-        The field of view and the range; the matcher plays no part.
+        Field of view and range; the settings of the matcher are ignored.
     settings : ScanSettings
     mapper : MapperSettings
-        What is an obstacle.
+        Heights of obstacles: ``step_height`` and ``robot_height``.
     """
     heights = mapper.step_height, mapper.robot_height
     xmin, ymin, xmax, ymax = world.bounds
@@ -89,7 +89,7 @@ def _check_number(features: float, name: str) -> None:
     if features > MOST:
         raise InputError(
             f"scan.{name}",
-            f"{MOST:g} features at most",
+            f"at most {MOST:g} features",
             f"{features:.3g}",
             hint="Give a larger step, or smaller bounds of the world [m].",
         )
@@ -98,7 +98,7 @@ def _check_number(features: float, name: str) -> None:
 def _walls(
     edges: Floats, T_map_camera: Floats, sensor: SensorSettings, settings: ScanSettings
 ) -> Floats:
-    """Return the nearest place on an edge at each bearing, shape (n, 2) [m, map]."""
+    """Return the nearest point on an edge at each bearing, shape (n, 2) [m, map]."""
     forward = float(np.arctan2(T_map_camera[1, 2], T_map_camera[0, 2]))
     half = float(np.arctan2(sensor.width_px / 2.0, sensor.fx))
     step = np.radians(settings.bearing)
@@ -107,8 +107,8 @@ def _walls(
     first_hits(
         T_map_camera[:2, 3].copy(), bearings, edges, ranges, np.empty(len(bearings), dtype=np.int64)
     )
-    found = ranges <= sensor.max_range
+    hit = ranges <= sensor.max_range
     ray = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
-    places = T_map_camera[:2, 3] + ranges[found, None] * ray[found]
+    places = T_map_camera[:2, 3] + ranges[hit, None] * ray[hit]
     inside: Floats = places[in_images(places, T_map_camera, sensor, sensor.max_range)]
     return inside

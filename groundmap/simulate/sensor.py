@@ -12,7 +12,7 @@ from groundmap.simulate.matching import MatchingSettings
 from groundmap.view.frames import T_REP103_OPTICAL, invert
 from groundmap.view.stereo_rig import StereoRig
 
-NEAREST = 0.2  # [m], depth: what is nearer is out of focus
+NEAREST = 0.2  # [m], least depth of features
 
 
 class SensorSettings(MatchingSettings):
@@ -22,19 +22,21 @@ class SensorSettings(MatchingSettings):
     width_px: int = Field(1280, gt=0, description="width of the images [px]")
     height_px: int = Field(720, gt=0, description="height of the images [px]")
     baseline: float = Field(0.54, gt=0, description="distance between the cameras [m]")
-    camera_height: float = Field(1.0, gt=0, description="above the ground [m]")
-    camera_forward: float = Field(0.0, description="ahead of the middle of the robot [m]")
-    pitch: float = Field(0.1, gt=-1.5, lt=1.5, description="of the camera, downwards [rad]")
-    max_range: float = Field(25.0, gt=0, description="of what is matched [m]")
-    max_points: int = Field(2000, ge=0, description="points matched in a view [features]")
-    max_segments: int = Field(500, ge=0, description="segments matched in a view [features]")
+    camera_height: float = Field(1.0, gt=0, description="height of the camera above the ground [m]")
+    camera_forward: float = Field(
+        0.0, description="position of the camera ahead of the robot's centre [m]"
+    )
+    pitch: float = Field(0.1, gt=-1.5, lt=1.5, description="downward pitch of the camera [rad]")
+    max_range: float = Field(25.0, gt=0, description="largest range of features [m]")
+    max_points: int = Field(2000, ge=0, description="most points in a view [features]")
+    max_segments: int = Field(500, ge=0, description="most segments in a view [features]")
     assumed_noise_px: float | None = Field(
-        None, gt=0, description="pixel noise that the rig claims; as it is, unless told [px]"
+        None, gt=0, description="pixel noise stated by the rig; default: the true one [px]"
     )
 
     @cached_property
     def rig(self) -> StereoRig:
-        """The rig as the log describes it."""
+        """The rig, as written to the log."""
         mount = np.eye(4)
         cos, sin = np.cos(self.pitch), np.sin(self.pitch)
         mount[:3, :3] = [(cos, 0.0, sin), (0.0, 1.0, 0.0), (-sin, 0.0, cos)]
@@ -46,11 +48,11 @@ class SensorSettings(MatchingSettings):
         )  # fmt: skip
 
     def project(self, T_map_base: Floats, places: Floats) -> tuple[Floats, Bools]:
-        """Return (uL, uR, v) of places, shape (n, 3) [px], and which are in both images.
+        """Return (uL, uR, v) of places, shape (n, 3) [px], and which of them are in both images.
 
         Parameters
         ----------
-        T_map_base : ndarray, shape (4, 4)
+        T_map_base : ndarray, shape (4, 4) [m]
         places : ndarray, shape (n, 3) [m, map]
         """
         rig = self.rig

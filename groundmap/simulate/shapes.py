@@ -1,4 +1,4 @@
-"""Outlines and solids by the words that a scenario file uses: box, wall, pole, table."""
+"""The shapes of scenario files: box, polygon, wall, pole, table."""
 
 from __future__ import annotations
 
@@ -17,7 +17,12 @@ LEG, SLAB = 0.06, 0.05  # [m], of a table
 
 
 def box(x0: float, y0: float, x1: float, y1: float) -> shapely.Polygon:
-    """Return an upright rectangle from two opposite corners [m].
+    """Return an axis-aligned rectangle.
+
+    Parameters
+    ----------
+    x0, y0, x1, y1 : float [m]
+        Two opposite corners.
 
     Raises
     ------
@@ -42,12 +47,18 @@ def polygon(corners: npt.ArrayLike) -> shapely.Polygon:
     ring = as_floats("polygon", corners, (None, 2))
     check_finite("polygon", ring)
     if len(ring) < 3:
-        raise InputError("polygon", "three corners or more [m]", str(len(ring)))
+        raise InputError("polygon", "at least three corners [m]", str(len(ring)))
     return shapely.Polygon(ring)
 
 
 def wall(points: npt.ArrayLike, *, thickness: float = 0.2) -> shapely.Polygon:
-    """Return a wall along a polyline, shape (n, 2) [m], which is its centre line.
+    """Return the outline of a wall.
+
+    Parameters
+    ----------
+    points : array_like, shape (n, 2) [m]
+        Its centre line.
+    thickness : float, default 0.2 [m]
 
     Examples
     --------
@@ -60,7 +71,7 @@ def wall(points: npt.ArrayLike, *, thickness: float = 0.2) -> shapely.Polygon:
     if farthest > FARTHEST:
         raise InputError("wall", f"corners within {FARTHEST:g} m", f"{farthest:g} m")
     if len(corners) < 2:
-        raise InputError("wall", "two corners or more [m]", str(len(corners)))
+        raise InputError("wall", "at least two corners [m]", str(len(corners)))
     thickness = as_number("thickness", thickness, f"a number up to {FARTHEST:g} [m]")
     if thickness > FARTHEST:
         raise InputError("thickness", f"a number up to {FARTHEST:g} [m]", f"{thickness:g}")
@@ -72,7 +83,15 @@ def wall(points: npt.ArrayLike, *, thickness: float = 0.2) -> shapely.Polygon:
 
 
 def pole(x: float, y: float, *, radius: float = 0.06) -> shapely.Polygon:
-    """Return a regular polygon of twelve corners around a place [m]; `radius` is to its corners."""
+    """Return a regular polygon of twelve corners.
+
+    Parameters
+    ----------
+    x, y : float [m]
+        Its centre.
+    radius : float, default 0.06 [m]
+        From the centre to the corners.
+    """
     x, y = as_number("x", x, "a number [m]"), as_number("y", y, "a number [m]")
     radius = as_number("radius", radius, "a number [m]")
     turns = 2.0 * np.pi * np.arange(POLE_SIDES) / POLE_SIDES
@@ -84,13 +103,13 @@ def pole(x: float, y: float, *, radius: float = 0.06) -> shapely.Polygon:
 def table(
     x0: float, y0: float, x1: float, y1: float, *, height: float = 0.75, **options: Any
 ) -> tuple[Solid, ...]:
-    """Return a table: a thin top on four legs, which it juts out over by 0.15 m.
+    """Return a table: a thin top on four legs, 0.15 m from its edges.
 
     Parameters
     ----------
     x0, y0, x1, y1 : float [m]
         Two opposite corners of its top.
-    height : float [m]
+    height : float, default 0.75 [m]
     **options
         Other parameters of the solids, such as ``texture``.
     """

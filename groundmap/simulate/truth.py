@@ -1,4 +1,4 @@
-"""The truth about a world, cell by cell: what is free, and what could be seen of it."""
+"""The ground truth of a world: its free cells, and which of them a drive could see."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ from groundmap.simulate.occlusion import (
 from groundmap.simulate.sensor import SensorSettings
 from groundmap.simulate.world import World
 
-HAIR = 1e-6  # [m], surfaces are looked at from this far before them; a cell touched by less is free
-SAME_PLACE = 1e-3  # [m], a surface seen this near to where one is at the end was that one
+HAIR = 1e-6  # [m], distance of samples from their surface; a cell that is touched by less is free
+SAME_PLACE = 1e-3  # [m], largest distance between samples of the same surface at two times
 
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What a map of a world should say, on the cells of a window.
+    """The correct map of a world, on the cells of a window.
 
     Attributes
     ----------
     obstacles : shapely.Geometry [m, map]
-        Where the robot can't be at the end of the drive.
+        Obstacles to the robot at the end of the drive.
     nonfree : ndarray of bool, shape (rows, cols)
-        Cells that an obstacle reaches into.
+        Cells that overlap an obstacle.
     visible : ndarray of bool, shape (rows, cols)
-        Cells of the world's ground whose centre some view saw along it: in both images, in range,
-        with nothing but free ground between.
+        Cells of the ground whose centre is visible from some view: in both images, in range, with
+        only free ground between.
     in_line : ndarray of bool, shape (rows, cols)
-        The same for a camera that looks all around and without end. Free cells of a map outside
-        of it lie behind a surface or in it: the dangerous mistake.
+        The same for a camera with a field of view of 360 degrees and unlimited range. Free cells of
+        a map outside of it lie in or behind a surface, which is the dangerous error.
     surfaces : ndarray, shape (n, 2) [m, map]
-        Places along the obstacles' outlines that some view saw, half a cell apart.
+        Points along the outlines of obstacles, half a cell apart, that are visible from some view.
     viewpoints : ndarray, shape (v, 2) [m, map]
     """
 
@@ -62,7 +62,7 @@ def truth_of(
     window: GridWindow,
     settings: MapperSettings,
 ) -> Truth:
-    """Return the truth about a world, as far as a drive could show it.
+    """Return the ground truth of a world for a drive.
 
     Parameters
     ----------
@@ -70,10 +70,9 @@ def truth_of(
     moves : Drive
     sensor : SensorSettings
     window : GridWindow
-        The cells to speak of.
+        The cells of the truth.
     settings : MapperSettings
-        What is an obstacle, and how far the map reaches: ``step_height``, ``robot_height``,
-        ``max_range``.
+        Heights of obstacles and range of the map: ``step_height``, ``robot_height``, ``max_range``.
     """
     heights = settings.step_height, settings.robot_height
     at_end = world.at(float(moves.times[-1])).obstacles(*heights)
@@ -104,7 +103,7 @@ def _within(bounds: tuple[float, float, float, float], places: Floats) -> Bools:
 
 
 class _Sight:
-    """What has been seen so far, view after view; what has been is not looked at again."""
+    """The cells and samples seen so far; those are not tested again."""
 
     def __init__(self, centres: Floats, samples: Floats) -> None:
         self.centres, self.samples = centres, samples
@@ -116,7 +115,18 @@ class _Sight:
         self, prisms: Prisms, T_map_camera: Floats, sensor: SensorSettings, reach: float,
         there: Bools,
     ) -> None:  # fmt: skip
-        """Add one view; `there` tells which samples are on a surface now."""
+        """Add one view.
+
+        Parameters
+        ----------
+        prisms : Prisms
+        T_map_camera : ndarray, shape (4, 4) [m]
+        sensor : SensorSettings
+        reach : float [m]
+            Largest range.
+        there : ndarray of bool, shape (n,)
+            Samples that are on a surface at the time of the view.
+        """
         eye = T_map_camera[:2, 3]
         ahead = in_images(self.centres, T_map_camera, sensor, reach) & ~self.visible
         self.visible[_clear(prisms, eye, self.centres, ahead)] = True
@@ -127,7 +137,16 @@ class _Sight:
 
 
 def in_images(places: Floats, T_map_camera: Floats, sensor: SensorSettings, reach: float) -> Bools:
-    """Return which places, shape (n, 2), have columns in both images, be it above or below them."""
+    """Return which places have a column in both images, regardless of their height.
+
+    Parameters
+    ----------
+    places : ndarray, shape (n, 2) [m, map]
+    T_map_camera : ndarray, shape (4, 4) [m]
+    sensor : SensorSettings
+    reach : float [m]
+        Largest range.
+    """
     axis = T_map_camera[:2, 2] / np.hypot(*T_map_camera[:2, 2])
     away = places - T_map_camera[:2, 3]
     depth, left = away @ axis, away @ np.array([-axis[1], axis[0]])
@@ -143,13 +162,21 @@ def in_images(places: Floats, T_map_camera: Floats, sensor: SensorSettings, reac
 def seen_along_ground(
     obstacles: shapely.Geometry, places: Floats, T_map_camera: Floats, sensor: SensorSettings
 ) -> Bools:
-    """Return which places on the ground, shape (n, 2), one view sees, in the sensor's range."""
+    """Return which places on the ground one view sees, in the range of the sensor.
+
+    Parameters
+    ----------
+    obstacles : shapely.Geometry [m, map]
+    places : ndarray, shape (n, 2) [m, map]
+    T_map_camera : ndarray, shape (4, 4) [m]
+    sensor : SensorSettings
+    """
     ahead = in_images(places, T_map_camera, sensor, sensor.max_range)
     return _clear(ground_level_prisms(obstacles), T_map_camera[:2, 3], places, ahead)
 
 
 def _clear(prisms: Prisms, eye: Floats, places: Floats, rows: Bools) -> Bools:
-    """Return which places among `rows` nothing hides, along the ground."""
+    """Return which places among `rows` are visible along the ground."""
     clear = np.zeros(len(places), dtype=np.bool_)
     targets = np.column_stack([places[rows], np.full(rows.sum(), GROUND_LEVEL)])
     clear[rows] = find_visible(prisms, np.array([*eye, GROUND_LEVEL]), targets)
@@ -157,7 +184,7 @@ def _clear(prisms: Prisms, eye: Floats, places: Floats, rows: Bools) -> Bools:
 
 
 def _still_there(samples: Floats, now: World, heights: tuple[float, float]) -> Bools:
-    """Return which samples of the obstacles at the end lie on an outline now."""
+    """Return which samples of the obstacles at the end lie on an outline at another time."""
     outlines = now.obstacles(*heights).boundary
     shapely.prepare(outlines)
     there: Bools = shapely.dwithin(shapely.points(samples), outlines, SAME_PLACE)
@@ -165,7 +192,7 @@ def _still_there(samples: Floats, now: World, heights: tuple[float, float]) -> B
 
 
 def _along_outlines(obstacles: shapely.Geometry, step: float) -> Floats:
-    """Return places a hair before all edges, `step` apart at most, shape (n, 2) [m]."""
+    """Return points `HAIR` in front of all edges, at most `step` apart, shape (n, 2) [m]."""
     pieces = [np.empty((0, 2))]
     for edge in edges_of(shapely.orient_polygons(obstacles)):
         start, along = edge[:2], edge[2:] - edge[:2]
@@ -180,15 +207,24 @@ def _along_outlines(obstacles: shapely.Geometry, step: float) -> Floats:
 def touched_cells(
     obstacles: shapely.Geometry, origin: Floats, resolution: float, shape: tuple[int, ...]
 ) -> Bools:
-    """Return which cells an obstacle reaches into by more than a hair, (rows, cols).
+    """Return which cells overlap an obstacle by more than `HAIR`, (rows, cols).
 
-    Cells far from all outlines are in or out as their centre is; the others are looked at exactly.
+    Cells far from all outlines are classified by their centre; the others are tested exactly.
+
+    Parameters
+    ----------
+    obstacles : shapely.Geometry [m, map]
+    origin : ndarray, shape (2,) [m, map]
+        Outer corner of cell (0, 0).
+    resolution : float [m]
+    shape : tuple of int
+        Rows and columns.
     """
     shapely.prepare(obstacles)
     cells = np.argwhere(np.ones(shape, dtype=np.bool_))
     centres = centres_of(cells, origin, resolution)
     touched: Bools = shapely.contains_xy(obstacles, centres)
-    on_outline = np.zeros(np.add(shape, 2), dtype=np.bool_)  # and a rim of one cell
+    on_outline = np.zeros(np.add(shape, 2), dtype=np.bool_)  # with a rim of one cell
     samples = 1 + cells_of(_along_outlines(obstacles, 0.5 * resolution), origin, resolution)
     inside = ((samples >= 0) & (samples < on_outline.shape)).all(axis=1)
     on_outline[tuple(samples[inside].T)] = True

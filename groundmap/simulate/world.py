@@ -1,4 +1,4 @@
-"""A world that is known: prisms on a flat ground, each there for some time."""
+"""Simulated worlds: prisms on a flat ground, each present for some time."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from shapely.affinity import translate
 from groundmap.arrays import as_floats, as_number, check_finite
 from groundmap.errors import InputError
 
-FARTHEST = 1e8  # [m] of an outline from the origin: beyond, edges of centimetres have no length
-THINNEST = 1e-9  # [m] between two sides: less is rounding, and faces would have no direction
+FARTHEST = 1e8  # [m] from the origin to an outline; beyond, edges of centimetres are rounded away
+THINNEST = 1e-9  # [m] between two sides; less is rounding, and faces would have no direction
 ALWAYS = (-math.inf, math.inf)
 
 
@@ -24,29 +24,29 @@ class Solid:
     Parameters
     ----------
     outline : shapely.Polygon [m, map]
-        Its footprint, holes allowed.
+        Its footprint, which may have holes.
     top, bottom : float [m]
-        Heights above the ground; a table top has a bottom above 0.
+        Heights above the ground; the bottom of a table top is above 0.
     texture : float, default 6 [1/m²]
-        Point features on its sides and its top. 0: a bare wall.
+        Point features on its sides and its top; 0 for a bare wall.
     lines : float, default 0.4 [1/m²]
         Segment features on its sides, in each direction.
     edges : bool, default True
-        Whether its upper and upright edges are matched, as segments.
+        Whether its upper and upright edges are matched as segments.
     transparent : bool, default False
-        Glass: sight passes through.
+        Whether it is glass, which does not end sight.
     repeat : float, default 0 [m]
-        Spacing of a pattern that looks the same everywhere, as fences have: what a matcher may
-        mistake one piece for the next of. 0: no such pattern.
+        Period of a repeated pattern, such as a fence, which a matcher may match one period off; 0
+        for no pattern.
     present : (float, float) [s]
-        From when until when it is there, the latter excluded.
+        Start and end of its presence; the end is excluded.
     velocity : (float, float) [m/s]
-        How it moves; `outline` is where it is at time 0.
+        Its velocity along x and y; `outline` is its footprint at time 0.
 
     Raises
     ------
     InputError
-        An outline that is no valid polygon or has no area, a top that is not above the bottom, a
+        An outline that is not a valid polygon or has no area, a top that is not above the bottom, a
         density below 0.
 
     Examples
@@ -69,7 +69,7 @@ class Solid:
     velocity: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        """Check what a prism needs; the outline's exterior is turned counter-clockwise."""
+        """Check the values, and orient the exterior of the outline counter-clockwise."""
         object.__setattr__(self, "outline", _polygon("outline", self.outline))
         bottom = as_number("bottom", self.bottom, "a height below the top [m]")
         top = as_number("top", self.top, "a height above the bottom [m]")
@@ -89,35 +89,35 @@ class Solid:
         object.__setattr__(self, "present", (since, until))
 
     def is_there(self, time: float) -> bool:
-        """Return whether it is there at a time [s]."""
+        """Return whether it is present at a time [s]."""
         return self.present[0] <= time < self.present[1]
 
     def shift(self, time: float) -> tuple[float, float]:
-        """Return how far it has moved at a time [s], x and y [m]."""
+        """Return its displacement at a time [s], x and y [m]."""
         if self.velocity == (0.0, 0.0):
             return 0.0, 0.0
         return self.velocity[0] * time, self.velocity[1] * time
 
     def at(self, time: float) -> Solid:
-        """Return it where it is at a time [s], at rest."""
+        """Return the solid at its place at a time [s], at rest."""
         x, y = self.shift(time)
         return replace(self, outline=translate(self.outline, x, y), velocity=(0.0, 0.0))
 
 
 @dataclass(frozen=True, eq=False)
 class Hole:
-    """A piece of ground that lies lower: a pit, a stair downwards.
+    """A lower part of the ground: a pit, a stair downwards.
 
     Parameters
     ----------
     outline : shapely.Polygon [m, map]
     depth : float [m]
-        How far below the ground its floor lies.
+        Depth of its floor below the ground.
 
     Raises
     ------
     InputError
-        An outline that is no valid polygon or has no area, a depth that is not above 0.
+        An outline that is not a valid polygon or has no area, a depth that is not positive.
     """
 
     outline: shapely.Polygon
@@ -149,7 +149,7 @@ class World:
     Raises
     ------
     InputError
-        Bounds that hold nothing, a density below 0.
+        Empty bounds, or a negative density.
 
     Examples
     --------
@@ -179,7 +179,7 @@ class World:
             object.__setattr__(self, name, value)
 
     def at(self, time: float) -> World:
-        """Return the world as it stands at a time [s]: what is there, where it is then."""
+        """Return the world at a time [s]: the solids present, at their places, at rest."""
         return replace(
             self, solids=tuple(solid.at(time) for solid in self.solids if solid.is_there(time))
         )
@@ -187,14 +187,14 @@ class World:
     def obstacles(
         self, step_height: float, robot_height: float, *, opaque: bool = False
     ) -> shapely.Geometry:
-        """Return where a robot can't be: solids it would hit, and holes it would fall into.
+        """Return the obstacles to a robot: solids that it would hit, and holes.
 
         Parameters
         ----------
         step_height, robot_height : float [m]
-            Solids between these heights are in the way; holes deeper than the step are.
-        opaque : bool
-            Only what ends the line of sight along the ground: no glass, no holes.
+            Solids between these heights are obstacles, and so are holes deeper than the step.
+        opaque : bool, default False
+            Whether to return only obstacles that end sight along the ground: no glass, no holes.
         """
         outlines = [
             solid.outline

@@ -1,4 +1,4 @@
-"""Solids and holes as a scenario file has them: one table for each."""
+"""Settings of the solids and holes in scenario files, a table each."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from groundmap.simulate.world import Hole, Solid
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
 OF_SOLIDS = ("texture", "lines", "edges", "transparent", "repeat", "velocity")
-TOP, TABLE_TOP = 2.5, 0.75  # [m], unless told
+TOP, TABLE_TOP = 2.5, 0.75  # [m], defaults
 
 
 class _Shaped(Settings):
-    """Something with an outline, given in one way of several."""
+    """The outline of a solid or a hole, given in exactly one way."""
 
     box: Box | None = Field(None, description="x0, y0, x1, y1: two opposite corners [m]")
     polygon: tuple[Point, ...] | None = Field(None, description="corners x, y [m]")
 
     def _pick_given(self, *ways: str) -> str:
-        """Return the one way that is given."""
+        """Return the name of the only one that is given."""
         given = [way for way in ways if getattr(self, way) is not None]
         if len(given) != 1:
             raise InputError("shape", f"one of {', '.join(ways)}", " and ".join(given) or "none")
@@ -34,28 +34,30 @@ class _Shaped(Settings):
 
 
 class SolidSettings(_Shaped):
-    """One solid, or one table; see `groundmap.simulate.Solid`."""
+    """A solid, or a piece of furniture of several; see `groundmap.simulate.Solid`."""
 
-    wall: tuple[Point, ...] | None = Field(None, description="corners of its centre line [m]")
-    thickness: float = Field(0.2, gt=0, description="of a wall [m]")
-    pole: Point | None = Field(None, description="x, y of its middle [m]")
-    radius: float = Field(0.06, gt=0, description="of a pole [m]")
-    table: Box | None = Field(None, description="two opposite corners of its top [m]")
+    wall: tuple[Point, ...] | None = Field(
+        None, description="corners of the centre line of a wall [m]"
+    )
+    thickness: float = Field(0.2, gt=0, description="thickness of a wall [m]")
+    pole: Point | None = Field(None, description="x, y of the centre of a pole [m]")
+    radius: float = Field(0.06, gt=0, description="radius of a pole [m]")
+    table: Box | None = Field(None, description="two opposite corners of the top of a table [m]")
     top: float | None = Field(
-        None, description="height of its top; 2.5, of a table 0.75, unless told [m]"
+        None, description="height of its top; default: 2.5, for a table 0.75 [m]"
     )
     bottom: float = Field(0.0, description="height of its underside [m]")
     texture: float = Field(6.0, ge=0, description="point features on it [1/m²]")
     lines: float = Field(0.4, ge=0, description="segments on it, in each direction [1/m²]")
-    edges: bool = Field(True, description="whether its edges are matched")
-    transparent: bool = Field(False, description="glass")
+    edges: bool = Field(True, description="whether its edges are matched as segments")
+    transparent: bool = Field(False, description="whether it is glass")
     repeat: float = Field(0.0, ge=0, description="spacing of a repeated pattern; 0 for none [m]")
-    appears: float | None = Field(None, description="since when it is there [s]")
-    vanishes: float | None = Field(None, description="until when it is there [s]")
-    velocity: tuple[float, float] = Field((0.0, 0.0), description="along x and y [m/s]")
+    appears: float | None = Field(None, description="time from which on it is present [s]")
+    vanishes: float | None = Field(None, description="time until which it is present [s]")
+    velocity: tuple[float, float] = Field((0.0, 0.0), description="velocity along x and y [m/s]")
 
     def solids(self) -> tuple[Solid, ...]:
-        """Return what the table describes; a table in the room is five solids.
+        """Return the solids; a table consists of five.
 
         Examples
         --------
@@ -86,11 +88,11 @@ class SolidSettings(_Shaped):
 
 
 class HoleSettings(_Shaped):
-    """One hole in the ground; see `groundmap.simulate.Hole`."""
+    """A hole in the ground; see `groundmap.simulate.Hole`."""
 
-    depth: float = Field(gt=0, description="how far its floor lies below the ground [m]")
+    depth: float = Field(gt=0, description="depth of its floor below the ground [m]")
 
     def hole(self) -> Hole:
-        """Return what the table describes."""
+        """Return the hole."""
         given = getattr(self, way := self._pick_given("box", "polygon"))
         return Hole(box(*given) if way == "box" else polygon(given), depth=self.depth)

@@ -1,4 +1,4 @@
-"""Pictures: what they show, measured on the pixels and the artists."""
+"""Pictures of maps and routes, checked by their pixels and artists."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def luminance(color: tuple[float, float, float]) -> float:
     return float(np.dot(color, (0.299, 0.587, 0.114)))
 
 
-def test_the_four_states_keep_apart_in_greyscale() -> None:
+def test_the_four_states_are_distinct_in_greyscale() -> None:
     levels = {state: sorted(map(luminance, shades)) for state, shades in SHADES.items()}
     order = [CellState.NONFREE, CellState.CONTESTED, CellState.UNKNOWN, CellState.FREE]
     for darker, lighter in pairwise(order):
@@ -88,7 +88,7 @@ def rendered(figure: Figure) -> tuple[np.ndarray, int]:
 
 
 @pytest.mark.parametrize("width", [0.7, 3.0, 42.0, 880.0])
-def test_the_scale_bar_is_as_long_as_it_says(width: float) -> None:
+def test_the_scale_bar_has_its_stated_length(width: float) -> None:
     bounds = (5.0, 0.0, 5.0 + width, width / 2)
     _, ax = new_figure(bounds)
     _, bar, text, _ = draw_grid(small_grid(), bounds=bounds, ax=ax)
@@ -145,7 +145,7 @@ def test_an_empty_trajectory_draws_nothing() -> None:
     assert draw_trajectory(np.empty((0, 3)), ax=ax) == []
 
 
-def test_verdicts_are_sorted_by_what_the_map_says() -> None:
+def test_verdicts_are_grouped_by_the_state_of_their_cell() -> None:
     _, ax = new_figure((0.0, 0.0, 4.0, 1.0))
     places = np.array([(0.5, 0.5), (1.5, 0.5), (2.5, 0.5), (3.5, 0.5), (99.0, 0.5)])
     artists = draw_verdicts(small_grid(), obstacles=places, grounds=places[:1], ax=ax)
@@ -164,7 +164,7 @@ def test_verdicts_are_sorted_by_what_the_map_says() -> None:
     }
 
 
-def test_the_known_part_of_a_map_is_what_was_spoken_of() -> None:
+def test_the_known_bounds_enclose_the_observed_cells() -> None:
     assert known_bounds(small_grid(), margin=0.5).tolist() == [-0.5, -0.5, 3.5, 1.5]
 
 
@@ -174,7 +174,7 @@ def test_an_empty_map_has_no_known_part() -> None:
 
 
 @pytest.mark.parametrize("suffix", [".png", ".pdf", ".svg"])
-def test_pictures_are_files_of_their_kind(suffix: str, tmp_path: Path) -> None:
+def test_pictures_are_files_of_the_requested_format(suffix: str, tmp_path: Path) -> None:
     figure, ax = new_figure((0.0, 0.0, 4.0, 1.0))
     draw_grid(small_grid(), ax=ax)
     path = tmp_path / f"map{suffix}"
@@ -189,7 +189,7 @@ def test_another_kind_of_picture_is_refused(tmp_path: Path) -> None:
         save_figure(figure, tmp_path / "map.bmp")
 
 
-def test_a_view_taken_apart_shows_its_four_steps(tmp_path: Path) -> None:
+def test_the_picture_of_a_view_shows_its_four_steps(tmp_path: Path) -> None:
     rig = StereoRig(fx=700.0, fy=700.0, cx=320.0, cy=240.0, baseline=0.5)
     view = View.from_pixels(
         map_from_world(np.eye(4), "optical"),
@@ -217,7 +217,7 @@ def test_equal_routes_are_one_line_with_all_their_names() -> None:
     assert draw_routes({}, ax=ax) == []
 
 
-def test_an_outline_is_drawn_where_the_robot_is_and_as_it_looks() -> None:
+def test_outlines_are_drawn_at_the_poses_of_the_robot() -> None:
     _, ax = new_figure((0.0, 0.0, 9.0, 9.0))
     outline = [(-1.0, -0.5), (2.0, -0.5), (2.0, 0.5), (-1.0, 0.5)]
     places, headings = [(3.0, 3.0), (3.0, 5.0)], [np.pi / 2] * 2

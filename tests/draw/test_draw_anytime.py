@@ -1,4 +1,4 @@
-"""Costs over time: what the lines, the markers and the table show."""
+"""Pictures of costs over time: lines, markers and the table."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def drawn(progress: dict[str, Progress]) -> tuple[dict[str, Line2D], Axes]:
     return {line.get_label(): line for line in artists}, ax
 
 
-def test_a_line_leads_to_the_marker_of_what_was_handed_out() -> None:
+def test_a_line_ends_in_the_marker_of_the_returned_route() -> None:
     lines, _ = drawn(PLANNERS)
     assert lines.keys() == {"rrtstar", "bitstar", "rrt"}
     np.testing.assert_array_equal(lines["rrtstar"].get_xydata(), LINE)
@@ -73,12 +73,12 @@ def test_both_axes_are_logarithmic_and_the_optimum_is_near_the_bottom() -> None:
 
 
 @pytest.mark.parametrize("points", [[(1.0, np.nan)], [(1.0, 2.0, 3.0)]])
-def test_points_that_are_none_are_refused(points: Any) -> None:
+def test_invalid_points_are_refused(points: Any) -> None:
     with pytest.raises(InputError, match=r"rrt: expected "):
         drawn({"rrt": Progress(points, 1, 1)})
 
 
-def test_those_that_better_their_routes_come_first_and_differ_in_colour() -> None:
+def test_planners_that_improve_routes_come_first_in_distinct_colours() -> None:
     once, better = Progress([(1, 2)], 1, 1), Progress([(1, 2), (2, 1)], 1, 1)
     names = {f"p{i:02}": once if i < 30 else better for i in range(30 + len(COLOURS))}
     style = styles([Panel("", names)])
@@ -108,11 +108,11 @@ def test_the_table_counts_the_seeds_that_were_solved() -> None:
 
 def test_all_panels_of_a_figure_span_the_same_times() -> None:
     late = Panel("rooms, se2", {"rrt": Progress([(9.0, 2.0)], 20, 20)})
-    nobody = Panel("rooms, dubins", {"fmt": Progress([], 0, 20)})
-    figure = anytime_figure([PANEL, late, nobody], columns=2)
+    unsolved = Panel("rooms, dubins", {"fmt": Progress([], 0, 20)})
+    figure = anytime_figure([PANEL, late, unsolved], columns=2)
     *panels, table = [ax for ax in figure.get_axes() if ax.get_title(loc="left")]
     assert [ax.get_title(loc="left") for ax in panels] == [
-        panel.title for panel in (PANEL, late, nobody)
+        panel.title for panel in (PANEL, late, unsolved)
     ]
     assert len({ax.get_xlim() for ax in panels}) == 1
     low, high = panels[0].get_xlim()
@@ -122,11 +122,11 @@ def test_all_panels_of_a_figure_span_the_same_times() -> None:
     assert figure_png(figure).startswith(b"\x89PNG")
 
 
-def test_a_figure_of_nobody_who_found_anything_can_be_drawn() -> None:
+def test_a_figure_without_any_route_can_be_drawn() -> None:
     figure = anytime_figure([Panel("a, r2", {"fmt": Progress([], 0, 3)})], columns=1)
     assert figure_png(figure).startswith(b"\x89PNG")
 
 
 def test_a_figure_without_panels_is_refused() -> None:
-    with pytest.raises(InputError, match=r"panels: expected one at least, got none"):
+    with pytest.raises(InputError, match=r"panels: expected at least one, got none"):
         anytime_figure([], columns=1)

@@ -18,7 +18,7 @@ EDGES = np.array([(0, 1), (1, 2)])
 
 def drawn(vertices: object = VERTICES, edges: object = EDGES) -> LineCollection:
     _, ax = new_figure((0.0, 0.0, 5.0, 5.0))
-    (lines,) = draw_graph(vertices, edges, ax=ax)  # type: ignore[arg-type] # what is refused
+    (lines,) = draw_graph(vertices, edges, ax=ax)  # type: ignore[arg-type] # refused
     assert isinstance(lines, LineCollection)
     assert lines.axes is ax
     return lines
@@ -29,7 +29,7 @@ def test_every_edge_is_a_straight_line_between_its_vertices() -> None:
     assert segments == [[[1.0, 1.0], [3.0, 1.0]], [[3.0, 1.0], [3.0, 4.0]]]
 
 
-def test_a_graph_without_edges_is_no_line() -> None:
+def test_a_graph_without_edges_draws_no_line() -> None:
     assert drawn(edges=[]).get_segments() == []
     assert drawn(vertices=[], edges=[]).get_segments() == []
 
@@ -48,13 +48,13 @@ def test_routes_lie_over_the_graph_and_the_legend_names_both() -> None:
     ]
 
 
-def test_the_view_stays_where_it_is() -> None:
+def test_drawing_a_graph_keeps_the_limits_of_the_axes() -> None:
     lines = drawn(vertices=VERTICES + 100.0)
     assert lines.axes is not None
     assert lines.axes.get_xlim() == (0.0, 5.0)
 
 
-def test_many_edges_are_pixels_in_a_file_of_lines(tmp_path: Path) -> None:
+def test_many_edges_are_rasterised_in_vector_files(tmp_path: Path) -> None:
     sizes = []
     for count in (MANY - 1, 2 * MANY):
         figure, ax = new_figure((0.0, 0.0, 5.0, 5.0))
@@ -78,6 +78,6 @@ def test_many_edges_are_pixels_in_a_file_of_lines(tmp_path: Path) -> None:
         (VERTICES, [0, 1], r"edges: expected shape \(n, 2\), got shape \(2,\)"),
     ],
 )
-def test_what_is_no_graph_is_refused(vertices: object, edges: object, match: str) -> None:
+def test_an_invalid_graph_is_refused(vertices: object, edges: object, match: str) -> None:
     with pytest.raises(InputError, match=match):
         drawn(vertices, edges)

@@ -1,4 +1,4 @@
-"""Pictures of a map beside the truth, measured on the arrays and the pixels they show."""
+"""Pictures of the truth and of differences from it, checked by their arrays and pixels."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ POST = (3, 6)  # the one cell with an obstacle
 
 
 def truth() -> dict[str, Any]:
-    """Return a post, the ground left of it in sight, and what it hides behind it."""
+    """Return a post, the visible ground left of it, and the cells that it hides."""
     nonfree = np.zeros((ROWS, COLS), dtype=np.bool_)
     nonfree[POST] = True
     behind = np.zeros_like(nonfree)
@@ -78,13 +78,13 @@ def case(*, rows: int = ROWS, cols: int = COLS, **options: Any) -> Figure:
     )
 
 
-def test_all_findings_keep_apart_in_greyscale() -> None:
+def test_all_findings_are_distinct_in_greyscale() -> None:
     colors = [color for _, color in FINDINGS.values()]
     levels = np.sort(np.array(colors) @ (0.299, 0.587, 0.114))
     assert np.diff(levels).min() >= 0.1
 
 
-def test_the_worse_a_finding_the_darker() -> None:
+def test_worse_findings_are_darker() -> None:
     order = (Finding.UNSEEN, Finding.MISSED, Finding.FALSE_NONFREE, Finding.FALSE_FREE)
     levels = np.array([FINDINGS[finding][1] for finding in order]) @ (0.299, 0.587, 0.114)
     assert (np.diff(levels) < 0).all()
@@ -106,7 +106,7 @@ def test_non_free_is_right_up_to_one_cell_from_an_obstacle() -> None:
 
 
 @pytest.mark.parametrize("state", [CellState.UNKNOWN, CellState.CONTESTED])
-def test_what_the_map_does_not_know_is_missed_where_it_was_in_sight(state: CellState) -> None:
+def test_unknown_cells_are_missed_where_they_were_in_sight(state: CellState) -> None:
     found = findings(states_of(state), **truth())
     visible = truth()["visible"]
     assert (found[visible] == Finding.MISSED).all()
@@ -116,7 +116,7 @@ def test_what_the_map_does_not_know_is_missed_where_it_was_in_sight(state: CellS
 @pytest.mark.parametrize("name", ["nonfree", "visible", "behind"])
 def test_a_truth_of_another_shape_is_refused(name: str) -> None:
     other = {**truth(), name: np.zeros((2, 3), dtype=np.bool_)}
-    with pytest.raises(InputError, match=rf"{name}: expected shape \(6, 8\), as the map, got"):
+    with pytest.raises(InputError, match=rf"{name}: expected the shape \(6, 8\) of the map, got"):
         findings(states_of(CellState.FREE), **other)
 
 
@@ -135,7 +135,7 @@ def test_a_false_free_cell_is_red_at_exactly_its_pixel() -> None:
         assert abs(beside - color).max() > 0.2
 
 
-def test_a_false_free_cell_is_seen_however_large_the_map() -> None:
+def test_a_false_free_cell_is_visible_on_maps_of_any_size() -> None:
     nothing = np.zeros((1500, 2000), dtype=np.bool_)
     nonfree = nothing.copy()
     nonfree[700, 901] = True
@@ -207,7 +207,7 @@ def test_the_panels_of_a_case_show_the_same_place() -> None:
 
 
 @pytest.mark.parametrize(("cols", "shape"), [(8, (1, 3)), (40, (3, 1))])
-def test_panels_of_wide_maps_are_below_each_other(cols: int, shape: tuple[int, int]) -> None:
+def test_panels_of_wide_maps_are_stacked(cols: int, shape: tuple[int, int]) -> None:
     place: Any = case(cols=cols).axes[0].get_subplotspec()
     assert place.get_gridspec().get_geometry() == shape
 

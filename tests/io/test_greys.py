@@ -1,4 +1,4 @@
-"""Images are read by the format of their pixels, or refused by it."""
+"""Grey values of images: the pixel format decides how they are read, or refused."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def read(
     if tags:
         info = TiffImagePlugin.ImageFileDirectory_v2()
         for name, value in tags.items():
-            if name != "photometric":  # Pillow would turn the pixels, too
+            if name != "photometric":  # Pillow would invert the pixels, too
                 info[numbers[name]] = value
         Image.fromarray(pixels).save(path, tiffinfo=info)
         _set_tags(path, {numbers[name]: value for name, value in tags.items()})
@@ -57,13 +57,13 @@ def _set_tags(path: Path, tags: dict[int, int]) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".tif", ".png", ".bmp", ".pgm", ".gif"])
-def test_greys_of_8_bits_are_read_as_they_are(tmp_path: Path, suffix: str) -> None:
+def test_greys_of_8_bits_are_read_unchanged(tmp_path: Path, suffix: str) -> None:
     grey, white = read(tmp_path, np.array(RAMP, dtype=np.uint8), suffix)
     npt.assert_array_equal(grey.astype(float) / white, np.array(RAMP) / 255)
 
 
 @pytest.mark.parametrize("suffix", [".tif", ".png", ".pgm"])
-def test_greys_of_16_bits_are_read_as_they_are(tmp_path: Path, suffix: str) -> None:
+def test_greys_of_16_bits_are_read_unchanged(tmp_path: Path, suffix: str) -> None:
     pixels = np.array([[0, 1, 30_000, 65_535]], dtype=np.uint16)
     grey, white = read(tmp_path, pixels, suffix)
     npt.assert_array_equal(grey, pixels)
@@ -71,7 +71,7 @@ def test_greys_of_16_bits_are_read_as_they_are(tmp_path: Path, suffix: str) -> N
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
-def test_a_tiff_whose_white_is_zero_is_turned(tmp_path: Path, kind: Any) -> None:
+def test_a_tiff_with_white_as_zero_is_inverted(tmp_path: Path, kind: Any) -> None:
     pixels = np.array(RAMP, dtype=kind)
     grey, white = read(tmp_path, pixels, tags={"photometric": 0})
     npt.assert_array_equal(grey, np.iinfo(kind).max - pixels)
@@ -96,7 +96,7 @@ def test_a_tiff_of_other_numbers_is_refused(
         read(tmp_path, pixels, tags=tags)
 
 
-def test_the_file_says_what_kind_of_image_it_is_and_documents_are_none(tmp_path: Path) -> None:
+def test_the_content_decides_the_image_format_and_documents_are_refused(tmp_path: Path) -> None:
     Image.fromarray(np.array(RAMP, dtype=np.uint8)).save(tmp_path / "image.eps")
     with pytest.raises(FileFormatError, match=r"image.eps: expected an image, got cannot identify"):
         read_greys(tmp_path / "image.eps", "an image")
@@ -106,9 +106,7 @@ def test_the_file_says_what_kind_of_image_it_is_and_documents_are_none(tmp_path:
     ("mode", "yaw"),
     [("Trinary", "0"), ("TRINARY", "1e-17"), ("trinary", "6.283185307179586"), ("trinary", "-0.0")],
 )
-def test_a_map_that_is_not_turned_is_read_however_its_file_says_so(
-    tmp_path: Path, mode: str, yaw: str
-) -> None:
+def test_an_origin_with_any_form_of_zero_yaw_is_read(tmp_path: Path, mode: str, yaw: str) -> None:
     Image.fromarray(np.array([[0, 254, 205]], dtype=np.uint8)).save(tmp_path / "map.png")
     (tmp_path / "map.yaml").write_text(YAML.format(image="map.png", mode=mode, yaw=yaw))
     found = read_ros_map(tmp_path / "map.yaml")
@@ -116,7 +114,7 @@ def test_a_map_that_is_not_turned_is_read_however_its_file_says_so(
     assert found.unknown.tolist() == [[False, False, True]]
 
 
-def test_a_map_that_is_turned_is_refused(tmp_path: Path) -> None:
+def test_an_origin_with_a_yaw_is_refused(tmp_path: Path) -> None:
     (tmp_path / "map.yaml").write_text(YAML.format(image="map.png", mode="trinary", yaw=1e-6))
     with pytest.raises(FileFormatError, match="expected an origin of yaw 0, got 1e-06"):
         read_ros_map(tmp_path / "map.yaml")

@@ -1,4 +1,4 @@
-"""Maps for other programs."""
+"""Export of maps for other programs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CELLS = {"free": (0, 0), "nonfree": (0, 1), "contested": (2, 0), "drop_off": (2,
 
 @pytest.fixture
 def grid() -> ConfidenceGrid:
-    """One tile with a cell of every state, whose corner lies at (-6.1, 2.3)."""
+    """Return a tile with a cell of every state; its corner is at (-6.1, 2.3)."""
     made = ConfidenceGrid(resolution=0.1524, origin=(-6.1, 2.3))
     tile = made.tile((0, 0))
     for cell, confidence in (("free", -0.5), ("nonfree", 0.5), ("contested", 0.001)):
@@ -68,9 +68,7 @@ def test_a_ros_map_gives_its_origin_with_all_digits(grid: ConfidenceGrid, tmp_pa
     assert read_pgm(tmp_path / "map.pgm").shape == (128, 192)
 
 
-def test_map_server_reads_each_grey_as_the_state_it_was(
-    grid: ConfidenceGrid, tmp_path: Path
-) -> None:
+def test_map_server_restores_the_state_of_each_grey(grid: ConfidenceGrid, tmp_path: Path) -> None:
     export(grid, tmp_path / "map.yaml")
     # map_server's trinary mode, with negate 0.
     occupancy = (255 - read_pgm(tmp_path / "map.pgm")[::-1].astype(float)) / 255
@@ -123,19 +121,19 @@ def test_dense_arrays_are_the_window(tmp_path: Path, origin: tuple[float, ...]) 
 
 @pytest.mark.parametrize("suffix", sorted(EXPORTERS))
 def test_an_empty_map_is_refused_and_nothing_written(tmp_path: Path, suffix: str) -> None:
-    with pytest.raises(InputError, match="grid: expected a map of something, got an empty one"):
+    with pytest.raises(InputError, match="grid: expected a map with known cells, got an empty one"):
         export(ConfidenceGrid(), tmp_path / f"map{suffix}")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_3d_map_is_no_image(tmp_path: Path) -> None:
+def test_a_3d_map_is_not_exported_as_an_image(tmp_path: Path) -> None:
     grid = ConfidenceGrid(origin=(0.0, 0.0, 0.0))
     with pytest.raises(InputError, match=r"a 2-D map, got a 3-D one. Export it as .npz"):
         export(grid, tmp_path / "map.yaml")
 
 
 @pytest.mark.parametrize("name", ["map.png", "map", "map.npz.bak"])
-def test_another_suffix_lists_the_known_ones(
+def test_the_error_for_another_suffix_lists_the_known_ones(
     grid: ConfidenceGrid, tmp_path: Path, name: str
 ) -> None:
     with pytest.raises(InputError, match=f"ends in .npz or .yaml, got '{name}'"):

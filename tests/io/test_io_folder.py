@@ -1,4 +1,4 @@
-"""Folders of views in our own format: what is read, and what is refused."""
+"""Folders of views: valid files are read, invalid ones refused."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_pixels_become_points_and_segments_of_their_views(folder: Path) -> None:
     npt.assert_allclose(views[1].segments.xyz, [[(0.5, 0.5, 10), (0.5, -0.5, 10)]], atol=1e-12)
 
 
-def test_an_optical_world_is_turned(folder: Path) -> None:
+def test_an_optical_world_is_rotated(folder: Path) -> None:
     views = list(read_views(folder))
     assert [view.timestamp for view in views] == [10.0, 10.5, 11.0]
     npt.assert_array_equal(views[1].T_map_camera[:3, 3], (2.5, 0, 0))
@@ -80,7 +80,7 @@ def test_a_rep103_world_is_the_map(folder: Path) -> None:
     npt.assert_array_equal(view.T_map_camera[:3, 3], (0.2, 0, 3.6))
 
 
-def test_a_log_is_sized_and_iterates_anew(folder: Path) -> None:
+def test_a_log_is_sized_and_re_iterable(folder: Path) -> None:
     views = read_views(folder)
     assert len(views) == 3
     assert [len(v.points) for v in views] == [len(v.points) for v in views]
@@ -101,7 +101,7 @@ def test_one_of_the_tables_is_enough(folder: Path, left: str) -> None:
     assert counts == ([2, 0, 1] if left == "points.csv" else [0, 1, 0])
 
 
-def test_a_header_alone_makes_empty_views(folder: Path) -> None:
+def test_a_table_without_rows_gives_empty_views(folder: Path) -> None:
     (folder / "segments.csv").unlink()
     (folder / "points.csv").write_text(POINTS.splitlines()[0])
     assert [len(view.points) for view in read_views(folder)] == [0, 0, 0]
@@ -113,7 +113,9 @@ def test_ids_in_a_csv_use_all_of_their_64_bits(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("lines", [1, 2, 3])
-def test_chunks_change_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch, lines: int) -> None:
+def test_the_chunk_size_does_not_matter(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, lines: int
+) -> None:
     whole = list(read_views(folder))
     monkeypatch.setattr(rows, "CHUNK_LINES", lines)
     for view, expected in zip(read_views(folder), whole, strict=True):
@@ -298,7 +300,7 @@ COLUMNS = {
 POINT_ROWS = np.loadtxt(POINTS.splitlines(), delimiter=",", skiprows=1)
 
 
-def test_an_archive_says_the_same_as_tables(folder: Path) -> None:
+def test_an_archive_is_read_like_tables(folder: Path) -> None:
     (folder / "segments.csv").unlink()
     from_tables = list(read_views(folder))
     archive(folder, points=POINT_ROWS)
@@ -339,7 +341,7 @@ def test_a_truncated_archive_is_refused(folder: Path, kept: float) -> None:
         read_views(folder)
 
 
-def test_a_bare_array_is_no_archive(folder: Path) -> None:
+def test_a_bare_array_is_refused(folder: Path) -> None:
     archive(folder, points=POINT_ROWS)
     with open(folder / "features.npz", "wb") as stream:
         np.save(stream, POINT_ROWS)
@@ -347,7 +349,7 @@ def test_a_bare_array_is_no_archive(folder: Path) -> None:
         read_views(folder)
 
 
-def test_tables_and_an_archive_are_one_too_many(folder: Path) -> None:
+def test_tables_beside_an_archive_are_refused(folder: Path) -> None:
     archive(folder, points=POINT_ROWS)
     (folder / "points.csv").write_text(POINTS)
     with pytest.raises(FileFormatError, match=r"got both features.npz and points.csv"):

@@ -1,4 +1,4 @@
-"""What is written is read back the same, all of it or nothing."""
+"""The writer of folders of views: written views are restored, and writing is atomic."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def assert_same(got: View, expected: View) -> None:
     counts=st.lists(st.tuples(st.integers(0, 4), st.integers(0, 3)), min_size=1, max_size=5),
     features=st.sampled_from(["csv", "npz"]),
 )
-def test_views_come_back_as_they_were_written(
+def test_written_views_are_read_unchanged(
     tmp_path_factory: pytest.TempPathFactory,
     seed: int,
     counts: list[tuple[int, int]],
@@ -90,7 +90,7 @@ def test_views_come_back_as_they_were_written(
     variances=st.lists(st.floats(min_value=0.0, allow_infinity=False), min_size=3, max_size=3),
     features=st.sampled_from(["csv", "npz"]),
 )
-def test_every_finite_float_comes_back_bit_by_bit(
+def test_every_finite_float_is_restored_bit_by_bit(
     tmp_path_factory: pytest.TempPathFactory,
     xy: tuple[float, float],
     depth: float,
@@ -106,7 +106,7 @@ def test_every_finite_float_comes_back_bit_by_bit(
 
 
 @FORMS
-def test_the_rig_comes_back(tmp_path: Path, features: str) -> None:
+def test_the_rig_is_restored(tmp_path: Path, features: str) -> None:
     T_base_camera = random_pose(np.random.default_rng(3))
     rig = replace(RIG, T_base_camera=T_base_camera)
     write_views([View(T_map_base=np.eye(4), rig=rig)], tmp_path / "views", features=features)
@@ -125,7 +125,7 @@ def test_a_view_without_a_timestamp_gets_its_index(tmp_path: Path, features: str
 
 @FORMS
 @needs_data
-def test_a_recorded_drive_comes_back(tmp_path: Path, features: str) -> None:
+def test_a_recorded_drive_is_restored(tmp_path: Path, features: str) -> None:
     drive = read_views(DATA / "kitti_raw_vo")
     write_views(drive, tmp_path / "views", features=features)
     for got, expected in zip(read_views(tmp_path / "views"), drive, strict=True):
@@ -239,13 +239,13 @@ def test_a_timestamp_that_is_not_finite_is_refused(tmp_path: Path) -> None:
         write_views([view], tmp_path / "views")
 
 
-def test_an_unknown_form_lists_those_there_are(tmp_path: Path) -> None:
+def test_the_error_for_an_unknown_form_lists_the_known_ones(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="features: expected one of csv, npz, got 'parquet'"):
         write_views([], tmp_path / "views", features="parquet")
 
 
 @FORMS
-def test_one_view_is_held_at_a_time(tmp_path: Path, features: str) -> None:
+def test_memory_holds_one_view_at_a_time(tmp_path: Path, features: str) -> None:
     alive: list[int] = []
 
     class Watched(View):

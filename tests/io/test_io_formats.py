@@ -1,4 +1,4 @@
-"""Which format a folder is in, and poses that replace a log's own."""
+"""Recognition of formats, and poses that replace those of a log."""
 
 from __future__ import annotations
 
@@ -67,7 +67,9 @@ def test_an_unknown_format_lists_the_nearest_first(folder: Path) -> None:
         read_views(folder, format="gstam")
 
 
-def test_an_unrecognised_folder_says_what_each_format_looks_for(tmp_path: Path) -> None:
+def test_the_error_for_an_unrecognised_folder_lists_the_files_of_each_format(
+    tmp_path: Path,
+) -> None:
     with pytest.raises(FileFormatError, match=r"\(gtsam: VO_cal.*; folder: rig.toml.*none of them"):
         read_views(tmp_path)
 
@@ -78,7 +80,7 @@ def test_a_path_that_does_not_exist_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_file_instead_of_a_folder_is_refused(folder: Path) -> None:
-    with pytest.raises(FileFormatError, match=r"got a file. Give the folder that holds it."):
+    with pytest.raises(FileFormatError, match=r"got a file. Give the folder that contains it."):
         read_views(folder / "poses.txt")
 
 

@@ -1,4 +1,4 @@
-"""The GTSAM visual-odometry set: what is read, and what is refused."""
+"""The GTSAM visual-odometry set: valid files are read, invalid ones refused."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def log(tmp_path: Path) -> Path:
 
 def write_log(path: Path, *, poses: str = POSES, factors: str = FACTORS) -> Path:
     path.mkdir()
-    (path / "VO_calibration.txt").write_text(CALIBRATION)  # no line end, as in the wild
+    (path / "VO_calibration.txt").write_text(CALIBRATION)  # no line end, as in published files
     (path / "VO_camera_poses.txt").write_text(poses)
     (path / "VO_stereo_factors.txt").write_text(factors)
     return path
@@ -54,7 +54,7 @@ def test_pixels_become_points_of_the_camera_frame(log: Path) -> None:
     npt.assert_allclose(view.points.xyz, [(0.5, 0.5, 10.0), (0.0, 0.0, 10.0)], atol=1e-12)
 
 
-def test_a_log_is_sized_and_iterates_anew(log: Path) -> None:
+def test_a_log_is_sized_and_re_iterable(log: Path) -> None:
     views = read_views(log)
     assert len(views) == 2
     again = [view.points.ids.tolist() for view in views]
@@ -78,7 +78,9 @@ def test_ids_use_all_of_their_64_bits(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("lines", [1, 2, 3, 7])
-def test_chunks_change_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lines: int) -> None:
+def test_the_chunk_size_does_not_matter(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lines: int
+) -> None:
     log = write_shuffled(tmp_path / "log", views=9, features=5)
     whole = list(read_views(log))
     monkeypatch.setattr(rows, "CHUNK_LINES", lines)
@@ -177,7 +179,7 @@ def test_binary_garbage_is_refused(log: Path, name: str) -> None:
         read_views(log)
 
 
-def test_byte_order_marks_and_crlf_are_passed_over(log: Path) -> None:
+def test_byte_order_marks_and_crlf_are_ignored(log: Path) -> None:
     expected = [view.points.ids.tolist() for view in read_views(log)]
     path = log / "VO_stereo_factors.txt"
     path.write_bytes(b"\xef\xbb\xbf" + FACTORS.replace("\n", "\r\n").encode())

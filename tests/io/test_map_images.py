@@ -1,4 +1,4 @@
-"""Maps that others drew."""
+"""Maps of map_server, and loading of maps by suffix."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_row_0_of_a_ros_map_is_the_lowest_of_its_image(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("free_thresh", "state"), [(0.196, "?"), (0.25, ".")])
-def test_what_grey_205_means_is_up_to_free_thresh(
+def test_free_thresh_decides_whether_grey_205_is_free(
     tmp_path: Path, free_thresh: float, state: str
 ) -> None:
     assert drawn(read_ros_map(ros_map(tmp_path, [[205]], free_thresh=free_thresh))) == [state]
@@ -78,12 +78,12 @@ def test_a_negated_map_is_blocked_where_it_is_white(tmp_path: Path, negate: int)
     assert drawn(read_ros_map(ros_map(tmp_path, [[0, 254, 100]], negate=negate))) == [".#?"]
 
 
-def test_colours_count_by_the_mean_of_their_channels(tmp_path: Path) -> None:
+def test_the_grey_of_a_colour_is_the_mean_of_its_channels(tmp_path: Path) -> None:
     red, orange, white = (255, 0, 0), (255, 190, 0), (255, 255, 255)
     assert drawn(read_ros_map(ros_map(tmp_path, [[red, orange, white]]))) == ["#?."]
 
 
-def test_what_is_transparent_is_darker_by_that(tmp_path: Path) -> None:
+def test_transparent_pixels_are_darker(tmp_path: Path) -> None:
     assert drawn(read_ros_map(ros_map(tmp_path, [[(255, 255, 255, 255), (255, 255, 255, 0)]]))) == [
         ".?"
     ]
@@ -109,7 +109,7 @@ def test_numbers_without_a_point_are_numbers(tmp_path: Path) -> None:
 
 
 @given(rngs(), st.floats(1e-6, 1e3), st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))
-def test_a_map_that_was_written_is_read_as_it_was(
+def test_a_written_map_is_read_unchanged(
     rng: np.random.Generator, resolution: float, x: float, y: float
 ) -> None:
     grid = ConfidenceGrid(resolution=resolution, origin=(x, y))
@@ -143,7 +143,7 @@ def test_a_missing_key_is_named(tmp_path: Path, key: str) -> None:
         ({"origin": 3}, r"an origin of \[x, y, yaw\], got '3'"),
         ({"origin": [0, 0]}, r"an origin of \[x, y, yaw\], got \['0', '0'\]"),
         ({"origin": [0, "east", 0]}, "a number for 'origin', got 'east'"),
-        ({"origin": [0, 0, 1.5]}, "an origin of yaw 0, got 1.5. Turn the image"),
+        ({"origin": [0, 0, 1.5]}, "an origin of yaw 0, got 1.5. Rotate the image"),
         ({"negate": 2}, "negate 0 or 1, got '2'"),
         ({"occupied_thresh": 0.1}, "free_thresh <= occupied_thresh <= 1, got 0.196 and 0.1"),
         ({"occupied_thresh": 65}, "free_thresh <= occupied_thresh <= 1, got 0.196 and 65"),
@@ -153,9 +153,7 @@ def test_a_missing_key_is_named(tmp_path: Path, key: str) -> None:
         ({"image": ""}, "the name of an image, got ''"),
     ],
 )
-def test_a_value_that_cannot_be_is_refused(
-    tmp_path: Path, keys: dict[str, Any], message: str
-) -> None:
+def test_an_invalid_value_is_refused(tmp_path: Path, keys: dict[str, Any], message: str) -> None:
     with pytest.raises(FileFormatError, match=f"map.yaml: expected .*{message}"):
         read_ros_map(ros_map(tmp_path, **keys))
 
@@ -183,14 +181,14 @@ def test_a_missing_yaml_file_is_named(tmp_path: Path) -> None:
         read_ros_map(tmp_path / "gone.yaml")
 
 
-def test_a_missing_image_is_named_with_the_map_that_wants_it(tmp_path: Path) -> None:
+def test_a_missing_image_is_named_with_its_map(tmp_path: Path) -> None:
     path = ros_map(tmp_path, image="gone.pgm")
     with pytest.raises(FileFormatError, match=r"gone.pgm: expected the image of map.yaml, got no"):
         read_ros_map(path)
 
 
 @pytest.mark.parametrize("content", [b"", b"no image", b"P5\n10 10\n255\nshort", b"P5\n-3 x\n"])
-def test_an_image_that_is_none_or_cut_short_is_refused(tmp_path: Path, content: bytes) -> None:
+def test_an_invalid_or_truncated_image_is_refused(tmp_path: Path, content: bytes) -> None:
     path = ros_map(tmp_path, image="bad.pgm")
     (tmp_path / "bad.pgm").write_bytes(content)
     with pytest.raises(FileFormatError, match=r"bad.pgm: expected an image, got"):
@@ -201,7 +199,7 @@ def test_an_image_that_is_none_or_cut_short_is_refused(tmp_path: Path, content: 
 
 
 @given(rngs(), st.sampled_from([2, 3]))
-def test_a_grid_of_blocked_cells_says_what_they_say(rng: np.random.Generator, ndim: int) -> None:
+def test_a_grid_of_blocked_cells_has_their_states(rng: np.random.Generator, ndim: int) -> None:
     shape, corner = tuple(rng.integers(1, 20, ndim)), tuple(rng.uniform(-9, 9, ndim).tolist())
     blocked = rng.random(shape) < 0.5
     unknown = ~blocked & (rng.random(shape) < 0.5)
@@ -229,7 +227,7 @@ def test_a_map_is_loaded_by_its_suffix(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["map.pgm", "map.PNG"])
-def test_an_image_alone_is_no_map(name: str) -> None:
+def test_an_image_without_a_yaml_is_refused(name: str) -> None:
     with pytest.raises(InputError, match=rf"{name}: expected a map, got an image. Give the .yaml"):
         load_map(name)
 
@@ -240,12 +238,12 @@ def test_another_file_is_not_a_map(tmp_path: Path) -> None:
         load_map(tmp_path / "notes.txt")
 
 
-# Real ones
+# Published maps
 
 
 @needs_data
 @pytest.mark.parametrize(("name", "unknown"), [("depot", False), ("tb3_sandbox", True)])
-def test_grey_205_of_the_ros_maps_is_what_their_yaml_makes_of_it(name: str, unknown: bool) -> None:
+def test_the_thresholds_of_published_maps_classify_grey_205(name: str, unknown: bool) -> None:
     found = read_ros_map(DATA / "ros_maps" / f"{name}.yaml")
     with Image.open(DATA / "ros_maps" / f"{name}.pgm") as image:
         grey = np.asarray(image)[::-1]

@@ -65,7 +65,7 @@ def test_every_kind_of_cell_is_free_or_blocked(tmp_path: Path) -> None:
         "type octile\nwidth 3\nheight 2 \nmap\n@..\n..T\n",
     ],
 )
-def test_line_ends_and_headers_differ_and_the_map_does_not(tmp_path: Path, text: str) -> None:
+def test_line_ends_and_headers_do_not_change_the_map(tmp_path: Path, text: str) -> None:
     assert drawn(read_movingai_map(movingai_map(tmp_path, text))) == ["#..", "..#"]
 
 
@@ -88,7 +88,7 @@ def test_line_ends_and_headers_differ_and_the_map_does_not(tmp_path: Path, text:
         ("image: map.pgm\n", "expected type, height, width or map, got 'image: map.pgm' at line 1"),
     ],
 )
-def test_a_map_that_breaks_its_format_is_refused(tmp_path: Path, text: str, message: str) -> None:
+def test_an_invalid_map_is_refused(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(FileFormatError, match=f"some.map: {message}"):
         read_movingai_map(movingai_map(tmp_path, text))
 
@@ -101,7 +101,7 @@ def test_a_missing_map_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("resolution", [0.0, -1.0, float("nan")])
-def test_cells_have_a_size(tmp_path: Path, resolution: float) -> None:
+def test_the_resolution_sets_the_size_of_cells(tmp_path: Path, resolution: float) -> None:
     path = movingai_map(tmp_path, HEADER + "...\n...\n")
     with pytest.raises(InputError, match=r"resolution: expected a number above 0 \[m\]"):
         read_movingai_map(path, resolution=resolution)
@@ -142,15 +142,13 @@ def test_voxels_are_where_their_lines_say(rng: np.random.Generator, end: str) ->
         ("voxel 2 3 4\n-1 2 3\n", "a voxel from 0 0 0 to 1 2 3, got '-1 2 3' at line 2"),
     ],
 )
-def test_voxels_that_break_their_format_are_refused(
-    tmp_path: Path, text: str, message: str
-) -> None:
+def test_invalid_voxels_are_refused(tmp_path: Path, text: str, message: str) -> None:
     path = written(tmp_path, "some.3dmap", text)
     with pytest.raises(FileFormatError, match=f"some.3dmap: .*{message}"):
         read_movingai_voxels(path)
 
 
-def test_voxels_have_a_size(tmp_path: Path) -> None:
+def test_the_resolution_sets_the_size_of_voxels(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"resolution: expected a number above 0 \[m\], got -1"):
         read_movingai_voxels(tmp_path / "some.3dmap", resolution=-1.0)
 
@@ -173,7 +171,7 @@ VOXEL_ROW = "1 2 3 1 2 9 6 1.0\n"
         "\ufeffversion 1\n" + ROW,
     ],
 )
-def test_queries_differ_in_form_and_say_the_same(tmp_path: Path, text: str) -> None:
+def test_queries_of_different_form_are_read_alike(tmp_path: Path, text: str) -> None:
     [query] = read_movingai_scen(written(tmp_path, "arena.map.scen", text))
     assert query._replace(line=0) == MovingAIQuery(
         tmp_path / "arena.map", (48, 49), (11, 1), (12, 3), 2.41421, 0
@@ -181,7 +179,7 @@ def test_queries_differ_in_form_and_say_the_same(tmp_path: Path, text: str) -> N
     assert query.solvable
 
 
-def test_a_maps_name_may_hold_spaces(tmp_path: Path) -> None:
+def test_the_name_of_a_map_may_contain_spaces(tmp_path: Path) -> None:
     text = "version 1\n" + ROW.replace("arena", "the old arena")
     [query] = read_movingai_scen(written(tmp_path, "old.scen", text))
     assert query.map_file == tmp_path / "the old arena.map"
@@ -216,9 +214,7 @@ def test_queries_in_voxels_have_layers_first(tmp_path: Path) -> None:
         ("version 1\n0 a.map 9 8 1 1 -3 3 2\n", "a goal on the map of 9 x 8 cells, got -3, 3"),
     ],
 )
-def test_queries_that_break_their_format_are_refused(
-    tmp_path: Path, text: str, message: str
-) -> None:
+def test_invalid_queries_are_refused(tmp_path: Path, text: str, message: str) -> None:
     path = written(tmp_path, "a.map.scen", text)
     with pytest.raises(FileFormatError, match=f"a.map.scen: .*{message}"):
         read_movingai_scen(path)
@@ -236,9 +232,7 @@ def test_queries_that_break_their_format_are_refused(
         ("version 1\na.3dmap\n1 2 3 1 2 9 inf 1\n", "a length of 0 or more, got inf at line 3"),
     ],
 )
-def test_queries_in_voxels_that_break_their_format_are_refused(
-    tmp_path: Path, text: str, message: str
-) -> None:
+def test_invalid_queries_in_voxels_are_refused(tmp_path: Path, text: str, message: str) -> None:
     path = written(tmp_path, "a.3dmap.3dscen", text)
     with pytest.raises(FileFormatError, match=f"a.3dmap.3dscen: .*{message}"):
         read_movingai_scen(path)
@@ -251,7 +245,7 @@ def test_missing_queries_are_named(tmp_path: Path) -> None:
         read_movingai_scen(tmp_path / "gone.scen")
 
 
-# Real ones
+# Published files
 
 
 @needs_data

@@ -1,4 +1,4 @@
-"""Drives: close enough views, and logs that are off in the ways they are told."""
+"""Drives: distances of views, and logs with the drift and noise of the settings."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def lengths(transforms: Floats) -> Floats:
 
 
 @given(tours(), st.floats(0.2, 3.0), st.floats(0.1, 1.0))
-def test_views_are_no_farther_apart_than_told(stops: Stops, every: float, turn: float) -> None:
+def test_views_are_at_most_the_set_distance_apart(stops: Stops, every: float, turn: float) -> None:
     true = moved(stops, every=every, every_turn=turn).true
     assert (lengths(true) <= every + 1e-9).all()
     assert (np.abs(apart(yaws(true)[1:], yaws(true)[:-1])) <= turn + 1e-9).all()
@@ -109,7 +109,7 @@ def test_views_are_evenly_spaced_in_time() -> None:
 
 
 @given(tours(), st.floats(-0.3, 0.3))
-def test_drift_stretches_the_way_driven(stops: Stops, drift: float) -> None:
+def test_drift_scales_the_driven_distance(stops: Stops, drift: float) -> None:
     moves = moved(stops, drift=drift)
     np.testing.assert_allclose(lengths(moves.logged), (1 + drift) * lengths(moves.true), atol=1e-9)
     np.testing.assert_allclose(apart(yaws(moves.logged), yaws(moves.true)), 0.0, atol=1e-9)
@@ -118,9 +118,7 @@ def test_drift_stretches_the_way_driven(stops: Stops, drift: float) -> None:
 
 
 @given(tours(), st.floats(-0.05, 0.05))
-def test_yaw_drift_turns_with_the_way_driven_but_not_with_turns(
-    stops: Stops, yaw_drift: float
-) -> None:
+def test_yaw_drift_grows_with_distance_but_not_with_turns(stops: Stops, yaw_drift: float) -> None:
     moves = moved(stops, yaw_drift=yaw_drift)
     driven = np.cumsum([0.0, *lengths(moves.true)])
     off = apart(yaws(moves.logged), yaws(moves.true))
@@ -141,7 +139,7 @@ def test_in_the_frame_of_each_view_the_log_has_the_true_next_move(
 
 @settings(max_examples=10)
 @given(rngs())
-def test_noise_is_as_large_as_told(rng: np.random.Generator) -> None:
+def test_noise_has_the_set_standard_deviation(rng: np.random.Generator) -> None:
     seed = int(rng.integers(2**32))
     moves = moved(AHEAD, seed, every=0.02, position_noise=0.2, yaw_noise=0.03)
     tolerance = 5.0 / np.sqrt(2 * len(moves.times))
@@ -158,7 +156,7 @@ def test_the_same_seed_makes_the_same_drive() -> None:
     assert not np.allclose(one.logged, other.logged)
 
 
-def test_a_drive_to_nowhere_is_refused() -> None:
+def test_a_drive_with_invalid_settings_is_refused() -> None:
     with pytest.raises(SettingsError, match=r"^stops: expected"):
         DriveSettings(stops=())
     with pytest.raises(SettingsError, match=r"^stops\.0\.1: expected"):
@@ -169,7 +167,7 @@ def test_a_drive_to_nowhere_is_refused() -> None:
         moved(AHEAD, yawdrift=0.1)
 
 
-def test_poses_that_are_none_are_refused() -> None:
+def test_invalid_poses_are_refused() -> None:
     with pytest.raises(InputError, match=r"^poses: expected shape \(n, 3\)"):
         to_transforms([(0, 0)])
     with pytest.raises(InputError, match=r"^poses: expected finite numbers"):

@@ -1,4 +1,4 @@
-"""Landmarks: on the surfaces that carry them, as dense as told, and moving with their owners."""
+"""Landmarks: on their surfaces, in the set densities, and moving with their owners."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def of(marks: LandmarkSet, owner: int) -> Floats:
 
 
 def off_the_sides(solid: Solid, xyz: Floats) -> Floats:
-    """Return how far points are from the upright faces [m]."""
+    """Return the distances of points from the upright faces [m]."""
     from_outline = shapely.distance(shapely.points(xyz[:, :2]), solid.outline.boundary)
     from_heights = np.maximum(solid.bottom - xyz[:, 2], xyz[:, 2] - solid.top)
     distance: Floats = np.hypot(from_outline, np.maximum(from_heights, 0.0))
@@ -97,7 +97,7 @@ def test_points_of_no_solid_lie_on_the_ground_or_in_a_hole(rng: np.random.Genera
 
 @settings(max_examples=15)
 @given(rngs())
-def test_there_are_as_many_points_as_the_densities_say(rng: np.random.Generator) -> None:
+def test_the_number_of_points_follows_the_densities(rng: np.random.Generator) -> None:
     points = sample_landmarks(WORLD, rng).points
     for row, solid in enumerate(WORLD.solids):
         assert_poisson(len(of(points, row)), solid.texture * area_of(solid))
@@ -153,7 +153,7 @@ def test_upper_and_upright_edges_are_covered_from_end_to_end() -> None:
     assert shapely.hausdorff_distance(upper, BLOCK.boundary) < HAIR
 
 
-def test_there_are_as_many_strokes_as_the_densities_say() -> None:
+def test_the_number_of_segments_follows_the_densities() -> None:
     block = Solid(BLOCK, top=1.5, lines=30.0, edges=False)
     ground = World(bounds=BOUNDS, solids=(block,), ground_lines=10.0)
     segments = sample_landmarks(ground, np.random.default_rng(1)).segments
@@ -183,7 +183,7 @@ def test_a_bare_world_has_no_landmarks() -> None:
     assert landmarks.segments.xyz.shape == (0, 2, 3)
 
 
-def test_the_same_seed_strews_the_same_landmarks() -> None:
+def test_the_same_seed_samples_the_same_landmarks() -> None:
     one, same, other = (sample_landmarks(WORLD, np.random.default_rng(seed)) for seed in (1, 1, 2))
     for mine, its, theirs in zip(one, same, other, strict=True):
         np.testing.assert_array_equal(mine.xyz, its.xyz)
@@ -191,7 +191,7 @@ def test_the_same_seed_strews_the_same_landmarks() -> None:
         assert not np.array_equal(mine.xyz[:50], theirs.xyz[:50])
 
 
-def test_landmarks_move_and_come_and_go_with_their_owner() -> None:
+def test_landmarks_move_appear_and_vanish_with_their_owner() -> None:
     landmarks, moving = sample_landmarks(WORLD, np.random.default_rng(1)), len(WORLD.solids) - 1
     for marks in landmarks:
         theirs = marks.owner == moving
@@ -212,5 +212,5 @@ def test_a_world_of_more_landmarks_than_memory_is_refused() -> None:
         World(bounds=(0, 0, 1e5, 6e4), ground_texture=12.0),
         World(bounds=(0, 0, 10, 10), solids=(box,)),
     ):
-        with pytest.raises(InputError, match=r"^world: expected 1e\+06 landmarks at most, got"):
+        with pytest.raises(InputError, match=r"^world: expected at most 1e\+06 landmarks, got"):
             sample_landmarks(world, np.random.default_rng(1))

@@ -1,4 +1,4 @@
-"""The matcher: exact unless told otherwise, and wrong at the rates and in the ways it is told."""
+"""The matcher: exact by default, with errors of the set rates and kinds."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def assert_share(count: int, rate: float) -> None:
 
 
 @given(rngs(), st.integers(0, 40), st.sampled_from([1, 2]))
-def test_a_perfect_matcher_finds_everything_where_it_is(
+def test_a_perfect_matcher_returns_the_true_pixels(
     rng: np.random.Generator, count: int, ends: int
 ) -> None:
     pixels, period = pixels_of(rng, count, ends), rng.uniform(0.0, 30.0, count)
@@ -46,7 +46,7 @@ def test_a_perfect_matcher_finds_everything_where_it_is(
     assert found.all()
 
 
-def test_noise_is_as_large_as_told_in_every_coordinate() -> None:
+def test_noise_has_the_set_standard_deviation_in_every_coordinate() -> None:
     rng = np.random.default_rng(1)
     pixels = pixels_of(rng, MANY, 2)
     before = pixels.copy()
@@ -55,11 +55,11 @@ def test_noise_is_as_large_as_told_in_every_coordinate() -> None:
     np.testing.assert_allclose(noise.std(axis=0), 0.7, rtol=5.0 / np.sqrt(2 * MANY))
     np.testing.assert_allclose(noise.mean(axis=0), 0.0, atol=5 * 0.7 / np.sqrt(MANY))
     assert np.abs(np.corrcoef(noise.T) - np.eye(6)).max() < 5.0 / np.sqrt(MANY)
-    np.testing.assert_array_equal(pixels, before)  # what was given stays as it is
+    np.testing.assert_array_equal(pixels, before)  # the input is not changed
 
 
 @pytest.mark.parametrize("rate", [0.1, 0.5, 0.9])
-def test_as_many_are_missing_false_or_ghosts_as_told(rate: float) -> None:
+def test_missing_false_and_ghost_matches_occur_at_the_set_rates(rate: float) -> None:
     rng = np.random.default_rng(1)
     pixels, period = pixels_of(rng, MANY, 1), np.full(MANY, 4.0)
     _, found = match(pixels, period, matcher(missing=rate), rng)
@@ -69,7 +69,7 @@ def test_as_many_are_missing_false_or_ghosts_as_told(rate: float) -> None:
         assert_share(int((matched != pixels).any(axis=(1, 2)).sum()), rate)
 
 
-def test_nothing_is_found_where_all_is_missing() -> None:
+def test_a_missing_rate_of_1_matches_nothing() -> None:
     rng = np.random.default_rng(1)
     _, found = match(pixels_of(rng, 50, 1), np.zeros(50), matcher(missing=1.0), rng)
     assert not found.any()
@@ -113,7 +113,7 @@ def test_ghosts_are_one_period_off_and_only_on_patterns(
     matched, _ = match(pixels, period, matcher(ghosts=1.0), rng)
     off = matched[..., 1] - pixels[..., 1]
     np.testing.assert_allclose(np.abs(off), np.tile(period[:, None], ends), atol=1e-9)
-    assert np.ptp(off, axis=1).max() < 1e-9  # both ends of a segment go the same way
+    assert np.ptp(off, axis=1).max() < 1e-9  # both ends of a segment move alike
     near, far = (off[:, 0] < -0.5).sum(), (off[:, 0] > 0.5).sum()
     assert near > 30
     assert far > 30
@@ -146,7 +146,7 @@ def test_pieces_of_a_broken_segment_lie_on_it_with_a_gap_of_a_tenth(
         assert len(pieces) == count * (1 + rate)
 
 
-def test_as_many_segments_are_broken_as_told() -> None:
+def test_segments_are_broken_at_the_set_rate() -> None:
     rng = np.random.default_rng(1)
     _, row = break_segments(pixels_of(rng, MANY, 2), matcher(fragments=0.3), rng)
     assert_share(len(row) - MANY, 0.3)
@@ -154,12 +154,12 @@ def test_as_many_segments_are_broken_as_told() -> None:
 
 @pytest.mark.parametrize("name", ["missing", "false_matches", "ghosts", "fragments"])
 @pytest.mark.parametrize("rate", [-0.1, 1.1, float("nan")])
-def test_a_rate_that_is_no_share_is_refused(name: str, rate: float) -> None:
+def test_a_rate_outside_0_to_1_is_refused(name: str, rate: float) -> None:
     with pytest.raises(SettingsError, match=rf"^{name}: expected"):
         matcher(**{name: rate})
 
 
 @pytest.mark.parametrize("name", ["pixel_noise_px", "quantum_px"])
-def test_less_than_no_noise_is_refused(name: str) -> None:
+def test_negative_noise_is_refused(name: str) -> None:
     with pytest.raises(SettingsError, match=rf"^{name}: expected greater than or equal to 0"):
         matcher(**{name: -0.1})

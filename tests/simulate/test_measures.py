@@ -1,4 +1,4 @@
-"""Measures: the truth scores best, nothing scores nothing, and planted mistakes are found."""
+"""Measures: the truth scores best, an empty map scores nothing, planted errors are found."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def truth(world: World, *poses: tuple[float, float, float]) -> Truth:
 
 
 def mapped(free: Bools, nonfree: Bools) -> GridWindow:
-    """A map of one view that says so; non-free before free."""
+    """Return a map of one view with these cells; non-free overrides free."""
     grid = ConfidenceGrid(resolution=RESOLUTION)
     z = np.where(nonfree, 1.0, np.where(free, -1.0, 0.0)).astype(np.float32)
     grid.fuse(np.array([0, 0]), z)
@@ -60,7 +60,7 @@ def random_truth(rng: np.random.Generator) -> Truth:
 
 @settings(max_examples=25)
 @given(rngs())
-def test_the_truth_as_a_map_makes_no_mistake(rng: np.random.Generator) -> None:
+def test_the_truth_as_a_map_has_perfect_measures(rng: np.random.Generator) -> None:
     known = random_truth(rng)
     found = measure(true_map(known), known)
     assert found.free_recall == found.free_precision == 1.0
@@ -74,7 +74,7 @@ def test_the_truth_as_a_map_makes_no_mistake(rng: np.random.Generator) -> None:
     assert found.visible_m2 == pytest.approx((known.visible & ~known.nonfree).sum() * 0.04)
 
 
-def test_a_wall_that_ends_where_cells_do_is_judged_as_any_other() -> None:
+def test_a_wall_that_ends_at_cell_borders_is_measured_like_any_other() -> None:
     aligned = World(bounds=BOUNDS, solids=(Solid(shapely.box(4, 0, 4.4, 8), top=1.0),))
     known = truth(aligned)
     found = measure(true_map(known), known)
@@ -86,11 +86,11 @@ def test_a_wall_that_ends_where_cells_do_is_judged_as_any_other() -> None:
 
 
 @given(rngs(), st.booleans())
-def test_a_map_that_knows_nothing_recalls_nothing(rng: np.random.Generator, wiped: bool) -> None:
+def test_an_empty_map_has_no_recall(rng: np.random.Generator, wiped: bool) -> None:
     known = random_truth(rng)
     nothing = np.zeros(SHAPE, dtype=np.bool_)
     window = mapped(nothing, nothing)
-    if wiped:  # contested is as good as unknown
+    if wiped:  # contested counts as unknown
         window.count[...] = 2
     found = measure(window, known)
     assert found.free_recall == found.nonfree_recall == 0.0
@@ -124,7 +124,7 @@ def test_a_block_of_free_cells_behind_a_wall_counts_cell_by_cell() -> None:
     assert found.false_free == pytest.approx(20.0 / (free.sum() + 20))
     assert found.false_free == found.false_free_beyond == found.false_free_beyond_cell
     assert found.false_free_depth == pytest.approx((34.5 - 20.0) * RESOLUTION)
-    assert found.free_precision == 1.0  # behind the wall a map can't know
+    assert found.free_precision == 1.0  # the area behind the wall is not observable
 
 
 @pytest.mark.parametrize("cols", [-2, 2])
@@ -180,7 +180,7 @@ def test_a_world_without_obstacles_has_nothing_to_recall() -> None:
     assert found.false_free == found.false_free_depth == 0.0
 
 
-def test_borders_beyond_ten_metres_of_every_view_are_not_judged() -> None:
+def test_borders_beyond_ten_metres_of_every_view_are_not_measured() -> None:
     near = truth(WALL, (0.5, 4.0, 0.0))
     far = Truth(**{**vars(near), "viewpoints": np.array([(-30.0, 4.0)])})
     window = true_map(near)
@@ -188,7 +188,7 @@ def test_borders_beyond_ten_metres_of_every_view_are_not_judged() -> None:
     assert measure(window, far).boundary_mean is None
 
 
-def test_free_where_free_is_right_nowhere_is_as_false_as_can_be() -> None:
+def test_a_free_map_of_a_world_without_free_cells_has_infinite_depth() -> None:
     known = truth(World(bounds=BOUNDS, solids=(Solid(shapely.box(-1, -1, 11, 9), top=1.0),)))
     assert known.nonfree.all()
     found = measure(mapped(np.ones(SHAPE, dtype=np.bool_), known.nonfree & False), known)

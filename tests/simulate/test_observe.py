@@ -1,4 +1,4 @@
-"""Views of a known world: exact without noise, complete, and never through a wall."""
+"""Views of a simulated world: exact without noise, complete, never through a wall."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def sensor_of(**options: Any) -> SensorSettings:
 
 
 def random_world(rng: np.random.Generator) -> World:
-    """Boxes ahead of the origin, some of them overhead, some of glass, some moving."""
+    """Draw boxes ahead of the origin; some are overhead, of glass, or moving."""
     solids = []
     for _ in range(rng.integers(1, 6)):
         x, y = rng.uniform((3.0, -4.0), (9.0, 4.0))
@@ -49,14 +49,14 @@ STILL = Drive(np.tile(np.eye(4), (2, 1, 1)), np.tile(np.eye(4), (2, 1, 1)), np.a
 
 
 def in_map(view: View, true: Floats) -> tuple[Floats, Floats]:
-    """Return where points and ends of segments are in the map, by the true pose."""
+    """Return points and ends of segments in the map, by the true pose."""
     T_map_camera = true @ view.rig.T_base_camera
     turn, place = T_map_camera[:3, :3].T, T_map_camera[:3, 3]
     return view.points.xyz @ turn + place, view.segments.xyz @ turn + place
 
 
 def at(marks: LandmarkSet, world: World, view: View) -> Floats:
-    """Return where landmarks are at the time of a view."""
+    """Return the places of landmarks at the time of a view."""
     speed = np.array([(0.0, 0.0, 0.0), *((*solid.velocity, 0.0) for solid in world.solids)])
     shift = speed[marks.owner + 1] * (view.timestamp or 0.0)
     return marks.xyz + (shift if marks.xyz.ndim == 2 else shift[:, None])
@@ -96,7 +96,7 @@ def test_every_feature_triangulates_back_to_its_landmark(rng: np.random.Generato
 
 
 def off_segments(ends: Floats, whole: Floats) -> Floats:
-    """Return how far both ends are from the segments that they are pieces of, (n, 2)."""
+    """Return the distances of both ends of pieces from their segments, (n, 2)."""
     first, way = whole[:, :1], whole[:, 1:] - whole[:, :1]
     share = ((ends - first) * way).sum(axis=2) / (way**2).sum(axis=2)
     nearest = first + np.clip(share, 0.0, 1.0)[..., None] * way
@@ -106,7 +106,7 @@ def off_segments(ends: Floats, whole: Floats) -> Floats:
 
 @settings(max_examples=25)
 @given(rngs())
-def test_all_that_nothing_hides_is_seen_and_nothing_else(rng: np.random.Generator) -> None:
+def test_exactly_the_unhidden_landmarks_are_seen(rng: np.random.Generator) -> None:
     world, sensor = random_world(rng), sensor_of()
     landmarks = sample_landmarks(world, rng)
     views = observe(world, landmarks, STRAIGHT, sensor, seed=1)
@@ -141,7 +141,7 @@ def test_views_have_random_numbers_of_their_own() -> None:
     assert not np.array_equal(one.points.ids, next_one.points.ids)
 
 
-def test_views_have_the_poses_that_the_log_has_and_its_times() -> None:
+def test_views_have_the_logged_poses_and_times() -> None:
     moves = moves_of((0, 0, 0), (3, 0, 30), position_noise=0.5, yaw_noise=0.1, seconds_per_view=0.5)
     world = World(bounds=(0, -6, 14, 6))
     landmarks = sample_landmarks(world, np.random.default_rng(1))
@@ -153,7 +153,7 @@ def test_views_have_the_poses_that_the_log_has_and_its_times() -> None:
 
 
 @pytest.mark.parametrize("most", [0, 1, 30])
-def test_no_more_is_matched_than_told(most: int) -> None:
+def test_no_more_features_are_matched_than_the_settings_allow(most: int) -> None:
     rng = np.random.default_rng(1)
     world = random_world(rng)
     landmarks, one = sample_landmarks(world, rng), Drive(*(a[:1] for a in STRAIGHT))
@@ -176,7 +176,7 @@ def test_of_a_segment_half_behind_a_box_the_other_half_is_seen() -> None:
     assert 0.46 - 0.5 <= ends[0, 1, 1] <= 0.46  # places are 0.5 m apart
 
 
-def test_what_is_gone_is_not_seen_and_hides_nothing() -> None:
+def test_a_vanished_solid_is_not_seen_and_hides_nothing() -> None:
     car = Solid(shapely.box(4, -2, 6, 2), top=1.5, present=(0.0, 0.5))
     world = World(bounds=(0, -6, 14, 6), solids=(car,))
     landmarks = sample_landmarks(world, np.random.default_rng(1))
@@ -196,4 +196,4 @@ def test_ids_tell_points_from_segments() -> None:
         lines = view.segments.ids
         assert (view.points.ids < split).all()
         assert ((split <= lines) & (lines < whole)).all()
-        assert (np.unique(lines, return_counts=True)[1] == 2).all()  # both pieces bear its id
+        assert (np.unique(lines, return_counts=True)[1] == 2).all()  # both pieces have its id

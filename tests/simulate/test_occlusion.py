@@ -1,4 +1,4 @@
-"""Sight among prisms: equal to shapely's, in the plane and in the plane of the line of sight."""
+"""Occlusion by prisms, compared with shapely in plan view and in the plane of sight."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def behind(target: tuple[float, float, float], outline: shapely.Polygon, top: fl
 
 
 def star(rng: np.random.Generator) -> shapely.Polygon:
-    """A polygon that is rarely convex, with a hole in it now and then."""
+    """Draw a polygon that is rarely convex and sometimes has a hole."""
     count = int(rng.integers(5, 12))
     turns = 2 * np.pi * (np.arange(count) + rng.uniform(0.0, 0.9, count)) / count
     around = np.stack([np.cos(turns), np.sin(turns)], axis=1)
@@ -116,7 +116,7 @@ def test_no_sight_leaks_between_boxes_that_touch_and_one_of_two_edges_is_inside(
 
 
 @pytest.mark.parametrize(("x", "answer"), [(2.0 - 1e-6, False), (2.0 + 1e-6, True), (4.0, True)])
-def test_a_hair_before_a_face_is_seen_and_a_hair_behind_it_is_hidden(
+def test_points_just_before_a_face_are_seen_and_just_behind_are_hidden(
     x: float, answer: bool
 ) -> None:
     assert behind((x, 0.3, 0.5), BOX) == answer
@@ -168,7 +168,7 @@ def test_the_floor_of_a_hole_is_seen_through_its_mouth_alone(rng: np.random.Gene
 
 
 def below_ground(eye: Floats, target: Floats, hole: Hole) -> tuple[bool, bool]:
-    """Whether sight is in the hole for sure wherever it is below the ground, and surely not."""
+    """Return whether sight below the ground is certainly in the hole, and certainly not."""
     sight = eye + np.linspace(0.0, 1.0, 400)[:, None] * (target - eye)
     places = shapely.points(sight[sight[:, 2] < 0, :2])
     outside = shapely.distance(places, hole.outline)

@@ -1,4 +1,4 @@
-"""The ideal sensor: what it gives lies where the world has it, and shapely sees the same."""
+"""The ideal sensor: features lie on the world, and visibility agrees with shapely."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def world_of(*solids: Solid, holes: tuple[Hole, ...] = ()) -> World:
 
 
 def random_world(rng: np.random.Generator) -> World:
-    """Some boxes on the far side of the hall, one of them low, one overhead, one of glass."""
+    """Return boxes on the far side of the hall: one low, one overhead, one of glass."""
     low = rng.uniform((3.0, 0.5), (8.0, 6.0), (5, 2))
     high = low + rng.uniform(0.2, 1.5, (5, 2))
     boxes = [shapely.box(*a, *b) for a, b in zip(low, high, strict=True)]
@@ -66,7 +66,7 @@ def places(view: View, true: Floats) -> tuple[Floats, Floats]:
 
 
 def eye_of(true: Floats) -> tuple[Floats, float]:
-    """Return the camera's place and the bearing that it looks along."""
+    """Return the place of the camera and its viewing direction."""
     T_map_camera = true @ SENSOR.rig.T_base_camera
     return T_map_camera[:2, 3], float(np.arctan2(T_map_camera[1, 2], T_map_camera[0, 2]))
 
@@ -76,7 +76,7 @@ def looks(world: World, moves: Drive, settings: ScanSettings = SCAN) -> list[Vie
 
 
 def free_line(obstacles: shapely.Geometry, eye: Floats, targets: Floats) -> Bools:
-    """Return to which places, shape (n, 2), the line from the eye meets no obstacle."""
+    """Return the places, shape (n, 2), whose line to the eye meets no obstacle."""
     lines = shapely.linestrings(np.stack([np.broadcast_to(eye, targets.shape), targets], axis=1))
     free: Bools = ~shapely.intersects(lines, obstacles)
     return free
@@ -105,7 +105,7 @@ def test_a_feature_lies_on_the_nearest_outline_at_every_step_of_bearing(
 
 
 def first_met(obstacles: shapely.Geometry, eye: Floats, bearing: float) -> Floats:
-    """Return where a ray first meets an outline; the hall's wall is all around [m, map]."""
+    """Return the first intersection of a ray with an outline [m, map]; the hall is closed."""
     end = eye + 99.0 * np.array([np.cos(bearing), np.sin(bearing)])
     met = shapely.intersection(shapely.LineString([eye, end]), obstacles.boundary)
     corners = shapely.get_coordinates(met)
@@ -115,7 +115,7 @@ def first_met(obstacles: shapely.Geometry, eye: Floats, bearing: float) -> Float
 
 @settings(max_examples=15)
 @given(rngs())
-def test_ground_features_are_all_of_the_lattice_that_is_in_sight_and_nothing_else(
+def test_ground_features_are_exactly_the_lattice_points_in_sight(
     rng: np.random.Generator,
 ) -> None:
     world = random_world(rng)
@@ -152,7 +152,7 @@ def test_features_are_certain() -> None:
         np.testing.assert_array_equal(covariance, SIGMA**2 * np.eye(3))
 
 
-def test_what_is_no_obstacle_is_not_seen_as_one() -> None:
+def test_solids_that_are_not_obstacles_have_no_features() -> None:
     moves = driven((1.0, 4.0, 0.0))
     box = shapely.box(4, 3, 5, 5)
     [bare] = looks(world_of(), moves)
@@ -175,7 +175,7 @@ def test_there_is_no_ground_where_a_hole_is() -> None:
     np.testing.assert_allclose(after, before[~inside])
 
 
-def test_a_moving_obstacle_is_seen_where_it_is_at_the_time() -> None:
+def test_a_moving_obstacle_is_seen_at_its_current_place() -> None:
     car = Solid(shapely.box(4, 3, 5, 5), top=1.0, velocity=(0.5, 0.0))
     moves = driven(*[(1.0, 4.0, 0.0)] * 4)
     for view, true in zip(looks(world_of(car), moves), moves.true, strict=True):
@@ -225,12 +225,12 @@ def test_views_have_the_poses_and_the_times_of_the_log() -> None:
     views = looks(world_of(), moves)
     np.testing.assert_array_equal([view.T_map_base for view in views], moves.logged)
     assert [view.timestamp for view in views] == moves.times.tolist()
-    walls, _ = places(views[1], moves.true[1])  # seen from where it truly is
+    walls, _ = places(views[1], moves.true[1])  # by the true pose
     outline = world_of().obstacles(*HEIGHTS).boundary
     assert shapely.distance(outline, shapely.points(walls[:, :2])).max() < 1e-6
 
 
-def test_a_world_of_nothing_is_all_ground() -> None:
+def test_an_empty_world_is_all_ground() -> None:
     world = replace(world_of(), solids=())
     moves = driven((1.0, 4.0, 0.0))
     [view] = looks(world, moves)
@@ -240,6 +240,6 @@ def test_a_world_of_nothing_is_all_ground() -> None:
 
 
 @pytest.mark.parametrize("key", ["bearing", "ground"])
-def test_steps_are_above_0(key: str) -> None:
+def test_steps_that_are_not_positive_are_refused(key: str) -> None:
     with pytest.raises(SettingsError, match=rf"^{key}: expected greater than 0, got 0\.0\.$"):
         ScanSettings(**{key: 0.0})

@@ -1,4 +1,4 @@
-"""The simulated rig: what it projects, its own description triangulates back."""
+"""The simulated rig: its description triangulates projected places back."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_projection_is_that_of_a_pinhole_camera(
 
 
 @given(sensors(), rngs())
-def test_what_is_projected_triangulates_back(
+def test_projected_places_triangulate_back(
     sensor: SensorSettings, rng: np.random.Generator
 ) -> None:
     pose, places = pose_of(rng), rng.uniform((-15, -15, -1), (15, 15, 3), (200, 3))
@@ -85,14 +85,14 @@ def ahead(places: list[tuple[float, float, float]], **options: Any) -> list[bool
     return found
 
 
-def test_what_one_camera_alone_sees_is_not_seen() -> None:
+def test_places_in_one_image_only_are_not_seen() -> None:
     # 1280 px at f = 640 px: 45 degrees to both sides; the right camera is 0.5 m to the right.
     at_left_rim = [(5.0, 4.51, 1.0), (5.0, 4.49, 1.0)]  # 4.5 m left of the left, 5 m of the right
     at_right_rim = [(5.0, -5.01, 1.0), (5.0, -4.99, 1.0)]
     assert ahead([*at_left_rim, *at_right_rim], baseline=0.5) == [False, True, False, True]
 
 
-def test_what_is_above_below_behind_too_near_or_too_far_is_not_seen() -> None:
+def test_places_above_below_behind_too_near_or_too_far_are_not_seen() -> None:
     up = 5.0 * 360.0 / 640.0
     assert ahead([(5.0, 0.0, 1.0 + up + 0.01), (5.0, 0.0, 1.0 + up - 0.01)]) == [False, True]
     assert ahead([(5.0, 0.0, 1.0 - up - 0.01), (5.0, 0.0, 1.0 - up + 0.01)]) == [False, True]
@@ -101,12 +101,12 @@ def test_what_is_above_below_behind_too_near_or_too_far_is_not_seen() -> None:
     assert ahead([(9.99, 0.0, 1.0), (10.01, 0.0, 1.0)], max_range=10.0) == [True, False]
 
 
-def test_a_camera_that_leans_down_sees_the_ground_nearer_by() -> None:
+def test_a_camera_pitched_down_sees_nearer_ground() -> None:
     pixels, _ = SensorSettings(pitch=0.2).project(np.eye(4), np.array([(1 / np.tan(0.2), 0, 0.0)]))
     np.testing.assert_allclose(pixels[0, [0, 2]], (640.0, 360.0), atol=1e-9)
 
 
-def test_nothing_projects_to_nothing() -> None:
+def test_no_places_project_to_no_pixels() -> None:
     pixels, seen = SensorSettings().project(np.eye(4), np.empty((0, 3)))
     assert (pixels.shape, seen.shape) == ((0, 3), (0,))
 
@@ -119,7 +119,7 @@ def test_nothing_projects_to_nothing() -> None:
         ({"pixel_noise_px": 0.0}, 1e-3),  # a rig without any is refused
     ],
 )
-def test_the_rig_claims_the_noise_it_has_unless_told(
+def test_the_default_noise_of_the_rig_is_the_true_one(
     options: dict[str, Any], claimed: float
 ) -> None:
     assert SensorSettings(**options).rig.pixel_noise_px == claimed
@@ -139,6 +139,6 @@ def test_the_rig_claims_the_noise_it_has_unless_told(
         ({"mising": 0.5}, r"Did you mean 'missing'\?"),  # the matcher's are the sensor's, too
     ],
 )
-def test_a_sensor_that_can_not_be_is_refused(options: dict[str, Any], message: str) -> None:
+def test_an_invalid_sensor_is_refused(options: dict[str, Any], message: str) -> None:
     with pytest.raises(SettingsError, match=message):
         SensorSettings(**options)

@@ -1,4 +1,4 @@
-"""Shapes by name: their areas are those of the formulas, and what is no shape is refused."""
+"""Shapes by name: their areas follow formulas, and invalid shapes are refused."""
 
 from __future__ import annotations
 

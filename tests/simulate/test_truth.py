@@ -1,4 +1,4 @@
-"""The truth of a world: what shapely's lines of sight say, cell by cell and view by view."""
+"""The ground truth of a world, compared with shapely's lines of sight."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Worlds: what they refuse, what stands where at a time, and what is in a robot's way."""
+"""Worlds: refused values, places of solids over time, obstacles to a robot."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def world_of(*solids: Solid, holes: tuple[Hole, ...] = ()) -> World:
         ({"top": 1.0, "present": (math.nan, 5.0)}, r"^present: expected \(from, until\)"),
     ],
 )
-def test_a_solid_that_can_not_be_is_refused(options: dict[str, Any], message: str) -> None:
+def test_an_invalid_solid_is_refused(options: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         Solid(UNIT, **options)
 
@@ -66,7 +66,7 @@ def test_an_outline_without_an_inside_is_refused(outline: shapely.Polygon) -> No
 
 
 @pytest.mark.parametrize("outline", [shapely.LineString([(0, 0), (1, 1)]), UNIT.bounds, None])
-def test_an_outline_that_is_no_polygon_is_refused(outline: Any) -> None:
+def test_an_outline_that_is_not_a_polygon_is_refused(outline: Any) -> None:
     with pytest.raises(InputError, match=r"^outline: expected a shapely.Polygon"):
         Solid(outline, top=1.0)
     with pytest.raises(InputError, match=r"^outline: expected a shapely.Polygon"):
@@ -82,21 +82,21 @@ def test_a_hole_that_is_not_deep_is_refused(depth: float) -> None:
 @pytest.mark.parametrize(
     "bounds", [(0, 0, 0, 1), (0, 1, 1, 1), (2, 0, 1, 1), (0, 0, math.inf, 1), (math.nan, 0, 1, 1)]
 )
-def test_bounds_that_hold_nothing_are_refused(bounds: tuple[float, float, float, float]) -> None:
+def test_empty_bounds_are_refused(bounds: tuple[float, float, float, float]) -> None:
     with pytest.raises(InputError, match=r"^bounds: expected XMIN < XMAX and YMIN < YMAX"):
         World(bounds=bounds)
 
 
 @pytest.mark.parametrize("name", ["ground_texture", "ground_lines"])
 @pytest.mark.parametrize("value", [-0.1, math.nan, math.inf])
-def test_ground_with_less_than_no_features_is_refused(name: str, value: float) -> None:
+def test_a_negative_density_of_ground_features_is_refused(name: str, value: float) -> None:
     options: dict[str, Any] = {name: value}
     with pytest.raises(InputError, match=rf"^{name}: expected a number of 0 or more \[1/m²\]"):
         World(bounds=BOUNDS, **options)
 
 
 @pytest.mark.parametrize("clockwise", [False, True])
-def test_outlines_are_turned_one_way_and_stay_the_same_area(clockwise: bool) -> None:
+def test_outlines_are_oriented_and_keep_their_area(clockwise: bool) -> None:
     ring = shapely.Polygon(square(0, 0, 4).exterior, [square(1, 1).exterior])
     given_ring = shapely.orient_polygons(ring, exterior_cw=clockwise)
     for outline in (Solid(given_ring, top=1.0).outline, Hole(given_ring, depth=1.0).outline):
@@ -114,7 +114,7 @@ def test_a_solid_is_there_from_its_first_moment_until_before_its_last() -> None:
 
 
 @given(rngs(), st.floats(-100.0, 100.0))
-def test_what_moves_is_where_its_velocity_takes_it(rng: np.random.Generator, time: float) -> None:
+def test_a_moving_solid_follows_its_velocity(rng: np.random.Generator, time: float) -> None:
     vx, vy = rng.normal(size=2)
     moving = Solid(square(*rng.normal(size=2)), top=1.0, velocity=(vx, vy), texture=3.0)
     then = world_of(moving, Solid(UNIT, top=2.0)).at(time)
@@ -126,7 +126,7 @@ def test_what_moves_is_where_its_velocity_takes_it(rng: np.random.Generator, tim
     assert then.at(17.0).solids[0].outline.equals_exact(expected, 1e-9)  # at rest
 
 
-def test_the_past_of_a_world_changes_nothing_in_it() -> None:
+def test_a_world_at_another_time_does_not_change_the_world() -> None:
     world = world_of(
         Solid(UNIT, top=1.0, velocity=(1.0, 0.0)), holes=(Hole(square(5, 5), depth=1),)
     )
@@ -147,19 +147,21 @@ def test_the_past_of_a_world_changes_nothing_in_it() -> None:
         (ROBOT - 0.01, 2.5, True),
     ],
 )
-def test_what_a_robot_would_hit_is_an_obstacle(bottom: float, top: float, in_the_way: bool) -> None:
+def test_solids_at_the_height_of_the_robot_are_obstacles(
+    bottom: float, top: float, in_the_way: bool
+) -> None:
     for opaque in (False, True):
         found = world_of(Solid(UNIT, bottom=bottom, top=top)).obstacles(STEP, ROBOT, opaque=opaque)
         assert found.equals(UNIT) if in_the_way else found.is_empty
 
 
-def test_glass_is_in_the_way_but_not_of_sight() -> None:
+def test_glass_is_an_obstacle_but_does_not_end_sight() -> None:
     world = world_of(Solid(UNIT, top=2.0, transparent=True), Solid(square(4, 4), top=2.0))
     assert world.obstacles(STEP, ROBOT).area == pytest.approx(2.0)
     assert world.obstacles(STEP, ROBOT, opaque=True).equals(square(4, 4))
 
 
-def test_holes_deeper_than_a_step_are_in_the_way_but_not_of_sight() -> None:
+def test_holes_deeper_than_a_step_are_obstacles_but_do_not_end_sight() -> None:
     holes = Hole(UNIT, depth=1.0), Hole(square(4, 4), depth=STEP)
     world = world_of(holes=holes)
     assert world.obstacles(STEP, ROBOT).equals(UNIT)
@@ -167,7 +169,7 @@ def test_holes_deeper_than_a_step_are_in_the_way_but_not_of_sight() -> None:
 
 
 @given(rngs())
-def test_obstacles_are_every_place_that_one_of_them_covers(rng: np.random.Generator) -> None:
+def test_obstacles_are_the_union_of_all_outlines(rng: np.random.Generator) -> None:
     corners = rng.uniform(0.0, 5.0, (rng.integers(0, 6), 2))
     outlines = [shapely.box(x, y, x + 2.0, y + 2.0) for x, y in corners]
     found = world_of(*(Solid(outline, top=1.0) for outline in outlines)).obstacles(STEP, ROBOT)

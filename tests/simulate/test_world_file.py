@@ -1,4 +1,4 @@
-"""Solids and holes from tables: each way gives its outline, and what is unclear is refused."""
+"""Settings of solids and holes: each shape gives its outline; ambiguous ones are refused."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_a_box_is_the_rectangle_between_two_opposite_corners(
     assert solid.outline.equals(shapely.box(*BOX))
 
 
-def test_a_polygon_has_the_corners_told() -> None:
+def test_a_polygon_has_the_given_corners() -> None:
     [solid] = SolidSettings(polygon=CORNERS).solids()
     assert solid.outline.equals(shapely.Polygon(CORNERS))
     assert solid.outline.area == 6.0
@@ -75,18 +75,18 @@ def test_a_table_is_a_slab_on_four_legs_below_it() -> None:
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_a_table_is_0_75_m_high_unless_told_and_all_else_2_5_m(way: str) -> None:
+def test_the_default_height_of_a_table_is_0_75_m_and_of_other_solids_2_5_m(way: str) -> None:
     tops = [solid.top for solid in SolidSettings(**{way: WAYS[way]}).solids()]
     assert max(tops) == (0.75 if way == "table" else 2.5)
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_a_height_that_is_told_is_kept(way: str) -> None:
+def test_a_given_height_replaces_the_default(way: str) -> None:
     assert SolidSettings(**{way: WAYS[way]}, top=1.1).solids()[0].top == 1.1
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_nothing_is_0_m_high(way: str) -> None:
+def test_a_height_of_0_is_refused(way: str) -> None:
     with pytest.raises(InputError, match=r"^top: expected a height above the bottom \[m\]"):
         SolidSettings(**{way: WAYS[way]}, top=0.0).solids()
 
@@ -96,7 +96,7 @@ def test_an_underside_lifts_a_solid_off_the_ground() -> None:
     assert (solid.bottom, solid.top) == (0.5, 0.6)
 
 
-def test_what_is_given_in_no_way_is_refused() -> None:
+def test_a_solid_without_a_shape_is_refused() -> None:
     with pytest.raises(
         InputError, match=r"^shape: expected one of box, polygon, wall, pole, table, got none\.$"
     ):
@@ -106,7 +106,7 @@ def test_what_is_given_in_no_way_is_refused() -> None:
 
 
 @pytest.mark.parametrize("other", [way for way in WAYS if way != "box"])
-def test_what_is_given_in_two_ways_is_refused(other: str) -> None:
+def test_a_solid_with_two_shapes_is_refused(other: str) -> None:
     with pytest.raises(InputError, match=rf"^shape: expected one of .*, got box and {other}\.$"):
         SolidSettings(**{"box": BOX, other: WAYS[other]}).solids()
     if other == "polygon":
@@ -130,7 +130,7 @@ def test_an_unknown_key_of_a_hole_names_the_nearest() -> None:
 
 
 @pytest.mark.parametrize(
-    ("told", "there"),
+    ("given", "there"),
     [
         ({}, (-math.inf, math.inf)),
         ({"appears": 5.0}, (5.0, math.inf)),
@@ -141,22 +141,22 @@ def test_an_unknown_key_of_a_hole_names_the_nearest() -> None:
 )
 @pytest.mark.parametrize("way", ["box", "table"])
 def test_a_solid_is_there_from_when_it_appears_until_it_vanishes(
-    way: str, told: dict[str, Any], there: tuple[float, float]
+    way: str, given: dict[str, Any], there: tuple[float, float]
 ) -> None:
-    for solid in SolidSettings(**{way: WAYS["table"], **told}).solids():
+    for solid in SolidSettings(**{way: WAYS["table"], **given}).solids():
         assert solid.present == there
         for time in (0.0, 1.9, 2.0, 4.9, 5.0):
             assert solid.is_there(time) is (there[0] <= time < there[1])
 
 
-def test_what_vanishes_before_it_appears_is_refused() -> None:
+def test_a_solid_that_vanishes_before_it_appears_is_refused() -> None:
     with pytest.raises(InputError, match=r"^present: expected \(from, until\) \[s\]"):
         SolidSettings(box=BOX, appears=5.0, vanishes=2.0).solids()
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_what_a_solid_is_like_reaches_every_piece_of_it(way: str) -> None:
-    told: dict[str, Any] = {
+def test_options_of_a_table_apply_to_all_its_solids(way: str) -> None:
+    given: dict[str, Any] = {
         "texture": 7.0,
         "lines": 1.5,
         "edges": False,
@@ -164,8 +164,8 @@ def test_what_a_solid_is_like_reaches_every_piece_of_it(way: str) -> None:
         "repeat": 0.3,
         "velocity": (1.0, -0.5),
     }
-    for solid in SolidSettings(**{way: WAYS[way]}, **told).solids():
-        assert {name: getattr(solid, name) for name in told} == told
+    for solid in SolidSettings(**{way: WAYS[way]}, **given).solids():
+        assert {name: getattr(solid, name) for name in given} == given
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Worlds made from seeds: what their docstrings call free is free."""
+"""Generated worlds: the areas that their docstrings call free are free."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def seeded(seed: int = 0) -> np.random.Generator:
 
 
 def defaults(name: str, folder: Path) -> dict[str, Any]:
-    """What a generator has to be told."""
+    """Return the settings that a generator requires."""
     if name != "image":
         return {}
     (folder / "some.map").write_text("type octile\nheight 2\nwidth 3\nmap\n@@.\n.T@\n")
@@ -56,7 +56,7 @@ def clearance(world: World, place: shapely.Geometry) -> float:
 
 
 def connected(world: World, places: list[shapely.Point], radius: float) -> bool:
-    """Whether a robot gets from any of the places to any other without leaving the bounds."""
+    """Return whether a robot reaches each place from each other within the bounds."""
     hit = world.obstacles(STEP, ROBOT).buffer(radius, quad_segs=32)
     free = shapely.get_parts(shapely.box(*world.bounds) - hit)
     return any(all(part.contains(place) for place in places) for part in free)
@@ -75,7 +75,7 @@ def test_a_seed_always_gives_the_same_world(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(GENERATORS))
-def test_nothing_stands_outside_the_bounds(name: str, tmp_path: Path) -> None:
+def test_no_solid_is_outside_the_bounds(name: str, tmp_path: Path) -> None:
     world = GENERATORS[name](**defaults(name, tmp_path)).make(seeded())
     ground = shapely.box(*world.bounds).buffer(HAIR)
     assert all(ground.covers(solid.outline) for solid in world.solids)
@@ -91,7 +91,7 @@ def test_no_two_solids_of_a_height_overlap(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(GENERATORS))
-def test_densities_are_those_asked_for(name: str, tmp_path: Path) -> None:
+def test_densities_are_those_of_the_settings(name: str, tmp_path: Path) -> None:
     values = {"ground_texture": 3.0, "ground_lines": 0.1}
     if name != "empty":
         values |= {"texture": 2.0, "lines": 0.0}
@@ -101,7 +101,7 @@ def test_densities_are_those_asked_for(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(GENERATORS))
-def test_every_field_says_what_it_is(name: str) -> None:
+def test_every_field_has_a_description(name: str) -> None:
     assert all(field.description for field in GENERATORS[name].model_fields.values())
 
 
@@ -121,13 +121,13 @@ def test_an_unknown_setting_is_refused() -> None:
         ("warehouse", {"aisle_width": 1.5}, "aisle_width: expected more than 1.6, to hold two"),
         ("warehouse", {"rack_length": 1}, "rack_length: expected more than 1.2, to hold a pallet"),
         ("parking", {"occupancy": 1.5}, "occupancy: expected less than or equal to 1"),
-        ("forest", {"bounds": (0, 0, 2, 9)}, "bounds: expected sides of 2.9 or more"),
+        ("forest", {"bounds": (0, 0, 2, 9)}, "bounds: expected sides of at least 2.9"),
         ("forest", {"bounds": (5, 0, 2, 9)}, "bounds: expected XMIN < XMAX"),
         ("forest", {"min_radius": 0.3}, "min_radius: expected at most max_radius, 0.25, got 0.3"),
         ("image", {"path": "a.map", "crop": (0, 3, 4, 3)}, "crop: expected XMIN < XMAX"),
     ],
 )
-def test_sizes_that_do_not_fit_one_another_are_refused(
+def test_sizes_that_do_not_fit_each_other_are_refused(
     name: str, values: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(SettingsError, match=message):
@@ -137,7 +137,7 @@ def test_sizes_that_do_not_fit_one_another_are_refused(
 # Each
 
 
-def test_an_empty_world_is_drivable_all_over() -> None:
+def test_an_empty_world_is_traversable_everywhere() -> None:
     world = Empty(bounds=(-1, -2, 3, 4)).make(seeded())
     assert world.obstacles(STEP, ROBOT).is_empty
     assert world.bounds == (-1, -2, 3, 4)
@@ -157,7 +157,7 @@ def test_an_empty_world_is_drivable_all_over() -> None:
         loops=st.just(0.0),
     ),
 )
-def test_rooms_are_reachable_from_one_another_whatever_stands_in_them(
+def test_furnished_rooms_are_reachable_from_each_other(
     rng: np.random.Generator, rooms: Rooms
 ) -> None:
     world = rooms.make(rng)
@@ -167,7 +167,7 @@ def test_rooms_are_reachable_from_one_another_whatever_stands_in_them(
     assert connected(world, centres, nearly)
 
 
-def test_without_loops_rooms_have_as_few_doors_as_reach_them_all() -> None:
+def test_without_loops_the_doors_form_a_tree() -> None:
     bare = Rooms(columns=4, rows=3, boxes=0, loops=0)
     total = bare.make(seeded()).obstacles(STEP, ROBOT).area
     all_doors = bare.model_copy(update={"loops": 1.0}).make(seeded()).obstacles(STEP, ROBOT).area
@@ -217,7 +217,7 @@ def test_aisles_and_cross_aisles_are_free_along_their_centre_lines(
     assert min(clearance(world, line) for line in across) >= min(aisle, cross) / 2 - HAIR
 
 
-def test_only_racks_look_the_same_everywhere() -> None:
+def test_only_racks_have_a_repeated_pattern() -> None:
     world = Warehouse(racks=2, blocks=3, bay=1.1, pallets=5).make(seeded())
     racks = [solid for solid in world.solids if solid.repeat]
     assert {(rack.repeat, rack.top) for rack in racks} == {(1.1, 2.2)}
@@ -251,7 +251,7 @@ def test_cars_are_parked_on_both_sides_and_apart() -> None:
 
 
 @given(rngs(), st.integers(0, 60), st.floats(0.4, 2.0), st.floats(0.0, 4.0))
-def test_trees_keep_their_distance_from_one_another_the_edge_and_the_clearing(
+def test_trees_keep_their_distance_from_each_other_the_edge_and_the_clearing(
     rng: np.random.Generator, trees: int, spacing: float, clearing: float
 ) -> None:
     world = Forest(
@@ -268,7 +268,9 @@ def test_trees_keep_their_distance_from_one_another_the_edge_and_the_clearing(
 
 @settings(max_examples=10)
 @given(rngs())
-def test_a_forest_is_open_to_all_that_fits_between_two_trees(rng: np.random.Generator) -> None:
+def test_a_robot_that_fits_between_two_trees_reaches_the_whole_forest(
+    rng: np.random.Generator,
+) -> None:
     world = Forest(trees=200, spacing=1.0).make(rng)
     hit = world.obstacles(STEP, ROBOT).buffer(0.49)
     free = shapely.box(*world.bounds) - hit
@@ -276,7 +278,9 @@ def test_a_forest_is_open_to_all_that_fits_between_two_trees(rng: np.random.Gene
 
 
 @given(st.floats(0.8, 4.0), st.floats(0.05, 0.5), st.integers(1, 4))
-def test_a_spiral_is_free_all_along_and_closed(width: float, wall: float, turns: int) -> None:
+def test_a_spiral_is_free_along_its_centre_line_and_closed(
+    width: float, wall: float, turns: int
+) -> None:
     spiral = Spiral(corridor_width=width, wall_thickness=wall, turns=turns)
     world = spiral.make(seeded())
     assert clearance(world, spiral.centre_line()) == pytest.approx(width / 2)
@@ -316,7 +320,7 @@ def test_a_movingai_map_has_its_first_row_at_y_0(tmp_path: Path) -> None:
     assert (wall.top, world.bounds) == (1.2, (0.0, 0.0, 1.5, 1.0))
 
 
-def test_a_crop_leaves_cells_where_they_were(tmp_path: Path) -> None:
+def test_a_crop_does_not_move_cells(tmp_path: Path) -> None:
     blocked = seeded().uniform(size=(30, 40)) < 0.3
     path = write_map(tmp_path / "a.map", blocked)
     whole = MapImage(path=path, resolution=0.1).make(seeded())
@@ -327,7 +331,7 @@ def test_a_crop_leaves_cells_where_they_were(tmp_path: Path) -> None:
     assert (kept ^ part.obstacles(STEP, ROBOT)).area < 1e-9
 
 
-def test_a_crop_beside_the_map_says_where_the_map_lies(tmp_path: Path) -> None:
+def test_the_error_for_a_crop_outside_the_map_states_its_bounds(tmp_path: Path) -> None:
     path = write_map(tmp_path / "a.map", np.zeros((2, 3), dtype=bool))
     made = MapImage(path=path, crop=(3, 0, 9, 2))
     with pytest.raises(InputError, match=r"crop: .* reaches from \(0, 0\) to \(3, 2\)"):
@@ -341,7 +345,7 @@ def test_a_map_that_is_missing_is_reported_when_the_world_is_made(tmp_path: Path
 
 
 @pytest.mark.skipif(not ROS_MAPS.is_dir(), reason="the ROS maps are not part of the project")
-def test_a_real_map_stands_where_its_yaml_says() -> None:
+def test_a_published_map_is_at_the_origin_of_its_yaml() -> None:
     world = MapImage(path=ROS_MAPS / "tb3_sandbox.yaml").make(seeded())
     assert world.bounds == pytest.approx((-10.0, -10.0, 9.2, 9.2))
     # The robot of Nav2's tutorial starts at (-2, -0.5), among nine pillars 1.1 m apart.

@@ -1,8 +1,8 @@
-"""What hides what, among prisms: straight sight against footprints with heights.
+"""Occlusion by prisms: lines of sight against footprints with heights.
 
-A footprint is a set of edges, holes and all: inside is where a line has crossed an odd number of
-them. An edge belongs to its lower end but not to its upper, so that a line through a corner counts
-it once.
+A footprint is a set of edges, including those of its holes: a point is inside if a line to it has
+crossed an odd number of them. An edge includes its lower end but not its upper, so that a line
+through a corner counts it once.
 """
 
 from __future__ import annotations
@@ -12,27 +12,27 @@ from numba import njit
 
 from groundmap.arrays import Bools, Floats, Ints
 
-TINY = 1e-12  # of a line of sight: a corner that is touched hides nothing
+TINY = 1e-12  # of a line of sight: a touched corner hides nothing
 
 
 @njit(cache=True, nogil=True)
 def find_hidden(
     eye: Floats, targets: Floats, edges: Floats, starts: Ints, heights: Floats, out: Bools
 ) -> None:
-    """Tell which targets have a prism between them and the eye.
+    """Set which targets have a prism between them and the eye.
 
     Parameters
     ----------
-    eye : ndarray, shape (3,)
-    targets : ndarray, shape (n, 3)
-    edges : ndarray, shape (e, 4)
-        x0, y0, x1, y1 of all footprints' edges, footprint by footprint.
+    eye : ndarray, shape (3,) [m, map]
+    targets : ndarray, shape (n, 3) [m, map]
+    edges : ndarray, shape (e, 4) [m, map]
+        x0, y0, x1, y1 of the edges of all footprints, one footprint after the other.
     starts : ndarray, shape (p + 1,)
-        The first edge of each footprint; at last, e.
+        Index of the first edge of each footprint; the last is e.
     heights : ndarray, shape (p, 2)
-        Bottom and top.
+        Bottom and top of each prism.
     out : ndarray of bool, shape (n,)
-        Set to the answer.
+        Set to whether each target is hidden.
     """
     prisms = len(starts) - 1
     most = 0
@@ -58,7 +58,19 @@ def find_hidden(
 
 @njit(cache=True, nogil=True)
 def first_hits(eye: Floats, bearings: Floats, edges: Floats, ranges: Floats, which: Ints) -> None:
-    """Set, for each bearing, the range of the nearest edge and its row; inf and -1 for none."""
+    """Set the range and the index of the nearest edge at each bearing.
+
+    Parameters
+    ----------
+    eye : ndarray, shape (2,) [m, map]
+    bearings : ndarray, shape (n,) [rad, map]
+    edges : ndarray, shape (e, 4) [m, map]
+        x0, y0, x1, y1.
+    ranges : ndarray, shape (n,) [m]
+        Set; infinite if no edge is hit.
+    which : ndarray of int64, shape (n,)
+        Set; -1 if no edge is hit.
+    """
     for i in range(len(bearings)):
         cos, sin = np.cos(bearings[i]), np.sin(bearings[i])
         ranges[i], which[i] = np.inf, -1
@@ -87,7 +99,7 @@ def _box_of(edges: Floats) -> Floats:
 
 @njit(cache=True, nogil=True)
 def _beside(eye: Floats, target: Floats, box: Floats) -> bool:
-    """Tell whether the box around a line of sight misses another box."""
+    """Return whether the box around a line of sight misses another box."""
     for axis in range(2):
         if max(eye[axis], target[axis]) < box[axis]:
             return True
@@ -98,7 +110,7 @@ def _beside(eye: Floats, target: Floats, box: Floats) -> bool:
 
 @njit(cache=True, nogil=True)
 def _between(start: float, end: float, bottom: float, top: float) -> tuple[float, float]:
-    """Return from where to where, 0 to 1, a line of sight is between two heights."""
+    """Return the interval, in 0 to 1, in which a line of sight is between two heights."""
     if start == end:
         if bottom < start < top:
             return 0.0, 1.0
@@ -109,9 +121,9 @@ def _between(start: float, end: float, bottom: float, top: float) -> tuple[float
 
 @njit(cache=True, nogil=True)
 def _cross(eye: Floats, target: Floats, edges: Floats, crossings: Floats) -> int:
-    """Collect, in order, where the whole line through eye and target crosses edges (0 to 1: sight).
+    """Collect the sorted crossings of a line through eye and target with edges; return their count.
 
-    The whole line, so that there is an even number of them.
+    Crossings between eye and target are 0 to 1. The unbounded line has an even number of crossings.
     """
     dx, dy = target[0] - eye[0], target[1] - eye[1]
     count = 0
@@ -135,7 +147,7 @@ def _cross(eye: Floats, target: Floats, edges: Floats, crossings: Floats) -> int
 
 @njit(cache=True, nogil=True)
 def _overlaps(crossings: Floats, count: int, first: float, last: float) -> bool:
-    """Tell whether a piece inside the footprint and the piece first..last share a length."""
+    """Return whether an interval inside the footprint overlaps the interval first..last."""
     for k in range(0, count - 1, 2):
         if min(crossings[k + 1], last) - max(crossings[k], first) > TINY:
             return True

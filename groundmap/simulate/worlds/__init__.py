@@ -1,4 +1,4 @@
-"""Worlds to simulate, by the names that scenario files use; each is made from a seed."""
+"""Generators of worlds, by their names in scenario files; each world is made from a seed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every generator of worlds shares."""
+"""The base classes of the generators of worlds."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ Box: TypeAlias = tuple[float, float, float, float]  # xmin, ymin, xmax, ymax [m,
 
 
 class WorldGenerator(Settings, ABC):
-    """Settings of one kind of world, which make as many such worlds as there are seeds.
+    """Settings of one kind of world, from which every seed makes a world.
 
     Raises
     ------
     SettingsError
-        Besides unknown keys and values out of range: sizes that do not fit one another.
+        Unknown keys, values out of range, or sizes that do not fit each other.
     """
 
     ground_texture: float = Field(6.0, ge=0, description="point features on the ground [1/m²]")
@@ -31,10 +31,17 @@ class WorldGenerator(Settings, ABC):
 
     @abstractmethod
     def make(self, rng: np.random.Generator) -> World:
-        """Return a world; the same state of the generator gives the same one."""
+        """Return a world; the same state of the random generator gives the same world."""
 
     def world(self, solids: list[Solid], bounds: Box) -> World:
-        """Return the world with the ground that was asked for."""
+        """Return a world of solids, with the ground of the settings.
+
+        Parameters
+        ----------
+        solids : list of Solid
+        bounds : tuple of float [m, map]
+            xmin, ymin, xmax, ymax.
+        """
         return World(
             solids=tuple(solids),
             bounds=bounds,
@@ -44,11 +51,11 @@ class WorldGenerator(Settings, ABC):
 
 
 class BuiltWorld(WorldGenerator):
-    """A world in which something stands."""
+    """Settings of a world with solids."""
 
-    texture: float = Field(6.0, ge=0, description="point features on what stands there [1/m²]")
+    texture: float = Field(6.0, ge=0, description="point features on the solids [1/m²]")
     lines: float = Field(
-        0.4, ge=0, description="segment features on its sides, in each direction [1/m²]"
+        0.4, ge=0, description="segment features on their sides, in each direction [1/m²]"
     )
 
     def solids(
@@ -58,7 +65,7 @@ class BuiltWorld(WorldGenerator):
         top: float,
         **options: Any,
     ) -> list[Solid]:
-        """Return a prism for each polygon of a geometry, or of several.
+        """Return a prism for each polygon of one or several geometries.
 
         Parameters
         ----------
@@ -74,7 +81,15 @@ class BuiltWorld(WorldGenerator):
 
 
 def require(name: str, value: float, least: float, what: str) -> None:
-    """Raise `SettingsError` unless a setting is above what the others leave room for.
+    """Raise `SettingsError` unless a setting is above a bound that results from others.
+
+    Parameters
+    ----------
+    name : str
+    value, least : float
+        The setting, and its bound.
+    what : str
+        The things that need the room, for the error message.
 
     Examples
     --------
@@ -89,7 +104,15 @@ got 1.5.
 
 
 def check_bounds(bounds: Box, *, name: str = "bounds") -> None:
-    """Raise `SettingsError` unless xmin, ymin, xmax, ymax [m] hold something."""
+    """Raise `SettingsError` if bounds are empty.
+
+    Parameters
+    ----------
+    bounds : tuple of float [m]
+        xmin, ymin, xmax, ymax.
+    name : str, default "bounds"
+        Name of the setting.
+    """
     xmin, ymin, xmax, ymax = bounds
     if not (xmin < xmax and ymin < ymax):
         raise SettingsError(name, "XMIN < XMAX and YMIN < YMAX [m]", str(bounds))

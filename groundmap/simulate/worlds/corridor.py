@@ -1,4 +1,4 @@
-"""A corridor that leads back to where it started."""
+"""A closed loop of corridors."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from groundmap.simulate.worlds.base import Box, BuiltWorld, require
 class Corridor(BuiltWorld):
     """A rectangular ring of corridor around a solid core, with niches and pilasters in its walls.
 
-    The core's centre is the origin. The ring's centre line, and what lies within half the
-    `corridor_width` less `pillar_size` of it, is free.
+    The origin is the centre of the core. The centre line of the ring is free, and so is the area
+    within ``corridor_width / 2 - pillar_size`` of it.
 
     Examples
     --------
@@ -23,18 +23,22 @@ class Corridor(BuiltWorld):
     (-9.0, -5.0, 9.0, 5.0)
     """
 
-    length: float = Field(20.0, gt=0, description="along x, between the outer walls [m]")
-    width: float = Field(12.0, gt=0, description="along y, between the outer walls [m]")
-    corridor_width: float = Field(2.5, gt=0, description="from the outer walls to the core [m]")
-    wall_thickness: float = Field(0.2, gt=0, description="of the outer walls, behind niches [m]")
-    height: float = Field(2.5, gt=0, description="of walls and core [m]")
+    length: float = Field(20.0, gt=0, description="distance of the outer walls along x [m]")
+    width: float = Field(12.0, gt=0, description="distance of the outer walls along y [m]")
+    corridor_width: float = Field(
+        2.5, gt=0, description="distance of the outer walls from the core [m]"
+    )
+    wall_thickness: float = Field(
+        0.2, gt=0, description="thickness of the outer walls, behind niches [m]"
+    )
+    height: float = Field(2.5, gt=0, description="height of walls and core [m]")
     niches: int = Field(6, ge=0, le=1000, description="recesses in outer walls and core [niches]")
-    niche_width: float = Field(1.2, gt=0, description="of each niche, along the wall [m]")
-    niche_depth: float = Field(0.5, gt=0, description="of each niche [m]")
+    niche_width: float = Field(1.2, gt=0, description="width of a niche along the wall [m]")
+    niche_depth: float = Field(0.5, gt=0, description="depth of a niche [m]")
     pillars: int = Field(
         8, ge=0, le=1000, description="pilasters on outer walls and core [pillars]"
     )
-    pillar_size: float = Field(0.4, gt=0, description="side of a pilaster's square [m]")
+    pillar_size: float = Field(0.4, gt=0, description="side of the square of a pilaster [m]")
 
     def check(self) -> None:
         """Refuse a core too small for its niches, and pilasters that close the corridor."""
@@ -45,11 +49,11 @@ class Corridor(BuiltWorld):
         require("corridor_width", self.corridor_width, 2 * self.pillar_size, "two pilasters")
 
     def centre_line(self) -> shapely.LinearRing:
-        """Return the middle of the corridor, once around [m, map]."""
+        """Return the centre line of the corridor, once around [m, map]."""
         return self._rectangle(self.corridor_width / 2).exterior
 
     def make(self, rng: np.random.Generator) -> World:
-        """Return outer walls and core, niches cut out of them and pilasters put before them."""
+        """Return the world: outer walls and core, with niches cut out and pilasters added."""
         hall, core = self._rectangle(0.0), self._rectangle(self.corridor_width)
         size, width, depth = self.pillar_size, self.niche_width, self.niche_depth
         added, cut = [], []
@@ -75,11 +79,11 @@ class Corridor(BuiltWorld):
     def _at_wall(
         self, rng: np.random.Generator, bounds: Box, width: float, depth: float
     ) -> shapely.Polygon:
-        """Return a rectangle somewhere along a wall, outwards of it; inwards if depth < 0."""
+        """Return a rectangle at a random place along a wall: outside, or inside if depth < 0."""
         xmin, ymin, xmax, ymax = bounds
         along_x = rng.uniform() < (xmax - xmin) / (xmax - xmin + ymax - ymin)
         low, high = (xmin, xmax) if along_x else (ymin, ymax)
-        # Niches end where those of the next wall begin, so that they never cut off a corner.
+        # Niches keep off the corners, so that those of two walls never cut one off.
         start = rng.uniform(low + self.niche_depth, high - self.niche_depth - width)
         if rng.uniform() < 0.5:
             wall, end = (ymax, ymax + depth) if along_x else (xmax, xmax + depth)

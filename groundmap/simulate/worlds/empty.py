@@ -1,4 +1,4 @@
-"""Nothing but ground."""
+"""Bare ground."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from groundmap.simulate.worlds.base import Box, WorldGenerator, check_bounds
 
 
 class Empty(WorldGenerator):
-    """A flat ground on which nothing stands; all of it is drivable, and nothing is random.
+    """A flat ground without solids; all of it is traversable, and nothing is random.
 
     Examples
     --------
@@ -23,7 +23,7 @@ class Empty(WorldGenerator):
     )
 
     def check(self) -> None:
-        """Refuse bounds that hold nothing."""
+        """Refuse empty bounds."""
         check_bounds(self.bounds)
 
     def make(self, rng: np.random.Generator) -> World:

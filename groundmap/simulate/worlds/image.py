@@ -1,4 +1,4 @@
-"""The world of a map: walls where its cells are blocked."""
+"""The world of a map: walls at its blocked cells."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from groundmap.simulate.worlds.base import Box, BuiltWorld, check_bounds
 
 
 class MapImage(BuiltWorld):
-    r"""Walls where a map's cells are blocked; nothing about them is random.
+    r"""Walls at the blocked cells of a map; nothing is random.
 
-    Every other cell, unknown ones among them, is free. Cells lie where the map says, or where
-    `read_movingai_map` puts them.
+    All other cells are free, including unknown ones. The places of cells are those of the map, for
+    ``.map`` files as `read_movingai_map` defines them.
 
     Examples
     --------
@@ -35,39 +35,39 @@ class MapImage(BuiltWorld):
     """
 
     path: Path = Field(description="a map of Nav2 (.yaml), or of MovingAI (.map)")
-    height: float = Field(2.5, gt=0, description="of the walls [m]")
+    height: float = Field(2.5, gt=0, description="height of the walls [m]")
     resolution: float = Field(
-        1.0, gt=0, description="size of a cell of a .map; a .yaml says its own [m/cell]"
+        1.0, gt=0, description="size of a cell of a .map; a .yaml states its own [m/cell]"
     )
     crop: Box | None = Field(
-        None, description="xmin, ymin, xmax, ymax: cells centred outside are left out [m]"
+        None, description="xmin, ymin, xmax, ymax; cells centred outside are omitted [m]"
     )
 
     def check(self) -> None:
-        """Refuse a crop that holds nothing."""
+        """Refuse an empty crop."""
         if self.crop is not None:
             check_bounds(self.crop, name="crop")
 
     def make(self, rng: np.random.Generator) -> World:
-        """Read the map, and return a prism for each piece of blocked cells that hang together.
+        """Read the map, and return a prism for each connected component of blocked cells.
 
         Raises
         ------
         FileFormatError
-            The file is neither kind of map, or breaks its format.
+            The file is not a map, or violates its format.
         InputError
-            A crop beside the map.
+            A crop outside the map.
         """
-        found = self._read()
+        source_map = self._read()
         if self.crop is not None:
-            found = _crop(found, self.crop)
-        corner = np.array(found.origin)
-        rows, cols = found.blocked.shape
+            source_map = _crop(source_map, self.crop)
+        corner = np.array(source_map.origin)
+        rows, cols = source_map.blocked.shape
         walls = shapely.transform(
-            outlines(found.blocked), lambda cells: corner + cells * found.resolution
+            outlines(source_map.blocked), lambda cells: corner + cells * source_map.resolution
         )
-        xmax, ymax = corner + np.array([cols, rows]) * found.resolution
-        bounds = (*found.origin, float(xmax), float(ymax))
+        xmax, ymax = corner + np.array([cols, rows]) * source_map.resolution
+        bounds = (*source_map.origin, float(xmax), float(ymax))
         return self.world(self.solids(walls, top=self.height), bounds)
 
     def _read(self) -> BlockedMap:
@@ -77,7 +77,7 @@ class MapImage(BuiltWorld):
 
 
 def outlines(blocked: Bools) -> list[shapely.Polygon]:
-    """Return the pieces of true cells that hang together by their sides, in (col, row).
+    """Return the outlines of the 4-connected components of true cells, in (col, row).
 
     Examples
     --------
@@ -85,9 +85,9 @@ def outlines(blocked: Bools) -> list[shapely.Polygon]:
     [3.0]
     """
     pieces, count = label(blocked)
-    # Runs of cells, because they are fewer; a piece at a time, because the union of a great many
-    # takes time out of proportion (3.3 s instead of 0.5 s on 400 x 400 cells at random). In whole
-    # cells neighbours meet exactly.
+    # Runs of cells, because they are fewer; one component at a time, because the time of a union
+    # grows faster than its size (3.3 s instead of 0.5 s on 400 x 400 random cells). In units of
+    # cells, neighbours share their edges exactly.
     steps = np.diff(np.pad(blocked, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     row, start = np.nonzero(steps == 1)
     _, stop = np.nonzero(steps == -1)
@@ -97,16 +97,16 @@ def outlines(blocked: Bools) -> list[shapely.Polygon]:
     return [shapely.union_all(group) for group in np.split(runs[order], first)[1:]]
 
 
-def _crop(found: BlockedMap, crop: Box) -> BlockedMap:
-    rows, cols = found.blocked.shape
-    x = _within(found.origin[0], found.resolution, cols, crop[0], crop[2])
-    y = _within(found.origin[1], found.resolution, rows, crop[1], crop[3])
+def _crop(source_map: BlockedMap, crop: Box) -> BlockedMap:
+    rows, cols = source_map.blocked.shape
+    x = _within(source_map.origin[0], source_map.resolution, cols, crop[0], crop[2])
+    y = _within(source_map.origin[1], source_map.resolution, rows, crop[1], crop[3])
     if x is None or y is None:
-        raise InputError("crop", "a piece of the map [m]", str(crop), hint=_extent(found))
-    origin = np.array(found.origin) + found.resolution * np.array([x.start, y.start])
-    return found._replace(
-        blocked=found.blocked[y, x],
-        unknown=found.unknown[y, x],
+        raise InputError("crop", "a piece of the map [m]", str(crop), hint=_extent(source_map))
+    origin = np.array(source_map.origin) + source_map.resolution * np.array([x.start, y.start])
+    return source_map._replace(
+        blocked=source_map.blocked[y, x],
+        unknown=source_map.unknown[y, x],
         origin=(float(origin[0]), float(origin[1])),
     )
 
@@ -117,10 +117,10 @@ def _within(first: float, side: float, count: int, low: float, high: float) -> s
     return slice(int(inside[0]), int(inside[-1]) + 1) if len(inside) else None
 
 
-def _extent(found: BlockedMap) -> str:
-    x, y = found.origin
-    rows, cols = found.blocked.shape
+def _extent(source_map: BlockedMap) -> str:
+    x, y = source_map.origin
+    rows, cols = source_map.blocked.shape
     return (
         f"The map reaches from ({x:g}, {y:g}) to "
-        f"({x + cols * found.resolution:g}, {y + rows * found.resolution:g})."
+        f"({x + cols * source_map.resolution:g}, {y + rows * source_map.resolution:g})."
     )

@@ -13,11 +13,11 @@ from groundmap.simulate.worlds.base import BuiltWorld
 KERB_HEIGHT = 0.12  # [m]
 CAR = (4.2, 1.8, 1.5)  # length, width, height [m]
 LANE = 2.2  # [m], width of the strip that cars are parked on
-LANE_JITTER = 0.15  # [m], how far a car stands from the middle of its strip
-CAR_GAP = (0.6, 1.6)  # [m], between two places
+LANE_JITTER = 0.15  # [m], largest distance of a car from the middle of its strip
+CAR_GAP = (0.6, 1.6)  # [m], between two parking places
 HOUSE_WIDTH = (6.0, 12.0)  # [m], along the street
-SETBACK = 0.5  # [m], how far a house stands back from the pavement, at most
-HOUSE_DEPTH = 1.0  # [m], what there is of a house behind its front
+SETBACK = 0.5  # [m], largest distance of a house from the pavement
+HOUSE_DEPTH = 1.0  # [m], least depth of a house
 KERB_TO_POLE = 0.3  # [m]
 
 
@@ -25,8 +25,8 @@ class Parking(BuiltWorld):
     """A street along x with cars parked on both sides, kerbs, lamp posts and fronts of houses.
 
     The street starts at x = 0, and y = 0 is its middle. The road between the parked cars,
-    `road_width` wide, is free from end to end. The pavements are 0.12 m high: ground to a robot
-    whose steps are higher.
+    `road_width` wide, is free from end to end. The pavements are 0.12 m high, which is ground to a
+    robot with a larger step height.
 
     Examples
     --------
@@ -35,17 +35,21 @@ class Parking(BuiltWorld):
     False
     """
 
-    length: float = Field(60.0, gt=0, le=10_000, description="of the street [m]")
-    road_width: float = Field(5.0, gt=0, description="free road between the parked cars [m]")
+    length: float = Field(60.0, gt=0, le=10_000, description="length of the street [m]")
+    road_width: float = Field(
+        5.0, gt=0, description="width of the road between the parked cars [m]"
+    )
     pavement: float = Field(2.0, gt=0, description="width of the pavement on each side [m]")
-    occupancy: float = Field(0.75, ge=0, le=1, description="share of the places that are taken")
-    pole_spacing: float = Field(12.0, ge=0.1, description="between lamp posts, on average [m]")
-    pole_radius: float = Field(0.08, gt=0, description="of a lamp post [m]")
-    pole_height: float = Field(4.0, gt=0, description="of a lamp post [m]")
-    height: float = Field(6.0, gt=0, description="of the fronts of the houses [m]")
+    occupancy: float = Field(
+        0.75, ge=0, le=1, description="share of the parking places that are occupied"
+    )
+    pole_spacing: float = Field(12.0, ge=0.1, description="mean distance between lamp posts [m]")
+    pole_radius: float = Field(0.08, gt=0, description="radius of a lamp post [m]")
+    pole_height: float = Field(4.0, gt=0, description="height of a lamp post [m]")
+    height: float = Field(6.0, gt=0, description="height of the houses [m]")
 
     def make(self, rng: np.random.Generator) -> World:
-        """Return both sides of the street, each furnished on its own."""
+        """Return the world: both sides of the street, independent of each other."""
         solids = [solid for side in (-1, 1) for solid in self._side(rng, side)]
         y = self._fronts + SETBACK + HOUSE_DEPTH
         return self.world(solids, (0.0, -y, self.length, y))

@@ -16,14 +16,15 @@ from groundmap.simulate.worlds.base import BuiltWorld, require
 JAMB = 0.2  # [m] of wall between a door and the corner of the room
 FURNITURE_SIDE = (0.4, 1.4)  # [m]
 FURNITURE_HEIGHT = (0.4, 1.5)  # [m]
-TRIES = 30  # for a piece of furniture; one that finds no place is left out
+TRIES = 30  # attempts to place a piece of furniture before it is omitted
 
 
 class Rooms(BuiltWorld):
     """Rooms on a grid, furnished with boxes, each reachable from every other through doorways.
 
-    The corner of the outer wall is the origin. Doors sit anywhere along their walls. The centre
-    of every room is free, and so is a way `passage` wide from there to each of the room's doors.
+    The origin is the corner of the outer wall. Doors are at random places along their walls. The
+    centre of every room is free, and so is a passage of width `passage` from there to each of its
+    doors.
 
     Examples
     --------
@@ -34,21 +35,19 @@ class Rooms(BuiltWorld):
     (0.0, 0.0, 12.8, 5.4)
     """
 
-    columns: int = Field(3, ge=1, le=100, description="rooms along x [rooms]")
-    rows: int = Field(2, ge=1, le=100, description="rooms along y [rooms]")
+    columns: int = Field(3, ge=1, le=100, description="number of rooms along x [rooms]")
+    rows: int = Field(2, ge=1, le=100, description="number of rooms along y [rooms]")
     room_width: float = Field(5.0, gt=0, description="clear size of a room along x [m]")
     room_depth: float = Field(4.0, gt=0, description="clear size of a room along y [m]")
-    wall_thickness: float = Field(0.2, gt=0, description="of every wall [m]")
-    height: float = Field(2.5, gt=0, description="of every wall [m]")
+    wall_thickness: float = Field(0.2, gt=0, description="thickness of the walls [m]")
+    height: float = Field(2.5, gt=0, description="height of the walls [m]")
     door_width: float = Field(1.0, gt=0, description="clear width of a doorway [m]")
-    passage: float = Field(1.0, gt=0, description="width of the ways free of furniture [m]")
-    loops: float = Field(
-        0.2, ge=0, le=1, description="share of the other walls that have a door as well"
-    )
-    boxes: int = Field(4, ge=0, le=1000, description="boxes in a room, at most [boxes]")
+    passage: float = Field(1.0, gt=0, description="width of the passages without furniture [m]")
+    loops: float = Field(0.2, ge=0, le=1, description="share of doors in walls that need none")
+    boxes: int = Field(4, ge=0, le=1000, description="most boxes in a room [boxes]")
 
     def check(self) -> None:
-        """Refuse walls shorter than their doors, and ways wider than them."""
+        """Refuse walls shorter than their doors, and passages wider than doors."""
         for name in ("room_width", "room_depth"):
             least = self.door_width + 2 * JAMB
             require(name, getattr(self, name), least, "a door between its jambs")
@@ -63,7 +62,7 @@ class Rooms(BuiltWorld):
         return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
 
     def make(self, rng: np.random.Generator) -> World:
-        """Return walls with doors, then furniture that leaves the ways between them free."""
+        """Return the world: walls with doors, and furniture that keeps the passages free."""
         t, centres = self.wall_thickness, self.centres()
         size = (self.columns * (self.room_width + t) + t, self.rows * (self.room_depth + t) + t)
         pairs = _pairs_with_door(rng, self._neighbours(), len(centres), self.loops)
@@ -74,8 +73,8 @@ class Rooms(BuiltWorld):
         outer = shapely.box(0.0, 0.0, *size)
         solids = self.solids(outer - shapely.union_all([*rooms, *gaps]), top=self.height)
         for index, room in enumerate(rooms):
-            mine = [door for door, pair in zip(doors, pairs, strict=True) if index in pair]
-            solids += self._furniture(rng, room, self._ways(centres[index], mine))
+            own = [door for door, pair in zip(doors, pairs, strict=True) if index in pair]
+            solids += self._furniture(rng, room, self._ways(centres[index], own))
         return self.world(solids, (0.0, 0.0, *size))
 
     def _neighbours(self) -> Ints:
@@ -86,7 +85,7 @@ class Rooms(BuiltWorld):
         return np.concatenate([beside, above])
 
     def _door(self, rng: np.random.Generator, a: Floats, b: Floats) -> Floats:
-        """Return the middle of a door somewhere along the wall between two rooms."""
+        """Return the centre of a door at a random place along the wall between two rooms."""
         middle: Floats = (a + b) / 2
         along, side = (1, self.room_depth) if a[1] == b[1] else (0, self.room_width)
         reach = (side - self.door_width) / 2 - JAMB
@@ -94,13 +93,13 @@ class Rooms(BuiltWorld):
         return middle
 
     def _gap(self, door: Floats, a: Floats, b: Floats) -> shapely.Polygon:
-        """Return the doorway, a little deeper than the wall, so that no film of it is left."""
+        """Return the doorway, slightly deeper than the wall, so that no sliver of it remains."""
         depth = 1.5 * self.wall_thickness
         beside = a[1] == b[1]
         return _around(door, *((depth, self.door_width) if beside else (self.door_width, depth)))
 
     def _ways(self, centre: Floats, doors: list[Floats]) -> shapely.Geometry:
-        """Return the ways from the centre of a room to its doors, which they meet squarely."""
+        """Return the passages from the centre of a room to its doors, perpendicular to these."""
         lines = [shapely.LineString([centre, centre])]
         for door in doors:
             beside = abs(door[0] - centre[0]) > self.room_width / 2
@@ -129,7 +128,7 @@ class Rooms(BuiltWorld):
 
 
 def _pairs_with_door(rng: np.random.Generator, pairs: Ints, rooms: int, loops: float) -> Ints:
-    """Return the pairs of a random spanning tree, and a share of the others."""
+    """Return the pairs of a random spanning tree, and a share `loops` of the others."""
     length = rng.uniform(1.0, 2.0, size=len(pairs))
     tree = minimum_spanning_tree(coo_array((length, pairs.T), shape=(rooms, rooms)))
     needed: Bools = tree.toarray()[tuple(pairs.T)] > 0

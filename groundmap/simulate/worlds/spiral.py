@@ -1,4 +1,4 @@
-"""A corridor that winds outwards."""
+"""A spiral corridor."""
 
 from __future__ import annotations
 
@@ -11,10 +11,9 @@ from groundmap.simulate.worlds.base import BuiltWorld
 
 
 class Spiral(BuiltWorld):
-    """A rectangular spiral of corridor, closed at both ends; nothing about it is random.
+    """A rectangular spiral corridor, closed at both ends; nothing is random.
 
-    It starts at the origin towards +x and turns left. The centre line is free, and so is the
-    whole `corridor_width` around it.
+    It starts at the origin towards +x and turns left. The whole width of the corridor is free.
 
     Examples
     --------
@@ -23,13 +22,13 @@ class Spiral(BuiltWorld):
     [(0.0, 0.0), (2.5, 0.0), (2.5, 2.5), (-2.5, 2.5), (-2.5, -2.5)]
     """
 
-    corridor_width: float = Field(2.0, gt=0, description="between the walls [m]")
-    wall_thickness: float = Field(0.2, gt=0, description="of every wall [m]")
-    turns: int = Field(2, ge=1, le=1000, description="times around [turns]")
-    height: float = Field(2.5, gt=0, description="of every wall [m]")
+    corridor_width: float = Field(2.0, gt=0, description="distance of the walls [m]")
+    wall_thickness: float = Field(0.2, gt=0, description="thickness of the walls [m]")
+    turns: int = Field(2, ge=1, le=1000, description="number of turns [turns]")
+    height: float = Field(2.5, gt=0, description="height of the walls [m]")
 
     def centre_line(self) -> shapely.LineString:
-        """Return the middle of the corridor, from the inside outwards [m, map]."""
+        """Return the centre line of the corridor, from the inside outwards [m, map]."""
         legs = np.arange(4 * self.turns)
         length = (legs // 2 + 1) * (self.corridor_width + self.wall_thickness)
         heading = np.array([(1, 0), (0, 1), (-1, 0), (0, -1)])[legs % 4]
@@ -37,7 +36,7 @@ class Spiral(BuiltWorld):
         return shapely.LineString(np.concatenate([np.zeros((1, 2)), corners]))
 
     def make(self, rng: np.random.Generator) -> World:
-        """Return the walls on both sides of the corridor and at its ends."""
+        """Return the world: walls on both sides of the corridor and at its ends."""
         corridor = self.centre_line().buffer(
             self.corridor_width / 2, cap_style="square", join_style="mitre"
         )

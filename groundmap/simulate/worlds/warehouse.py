@@ -10,16 +10,16 @@ from groundmap.arrays import Floats
 from groundmap.simulate.world import Solid, World
 from groundmap.simulate.worlds.base import BuiltWorld, require
 
-PALLET = (1.2, 0.8)  # [m], along a rack and away from it
+PALLET = (1.2, 0.8)  # [m], along the rack and across
 PALLET_HEIGHT = (0.3, 1.4)  # [m]
 
 
 class Warehouse(BuiltWorld):
-    """A hall of racks that all look the same, with aisles between them and pallets in the way.
+    """A hall of identical racks, with aisles between them and pallets in the aisles.
 
-    The hall's inner corner is the origin, and the racks lie along x. Cross aisles run along y:
-    before, between and behind the blocks of racks. Aisles and cross aisles are free along their
-    centre lines, the latter all over; a pallet stands before a rack and takes 0.8 m of its aisle.
+    The origin is the inner corner of the hall, and the racks run along x. Cross aisles run along y,
+    before, between and behind the blocks of racks. Aisles are free along their centre lines, cross
+    aisles over their whole width. A pallet stands beside a rack and takes 0.8 m of its aisle.
 
     Examples
     --------
@@ -28,37 +28,37 @@ class Warehouse(BuiltWorld):
     ([1.0, 4.0, 7.0, 10.0], [1.5, 12.5, 23.5])
     """
 
-    racks: int = Field(4, ge=1, le=100, description="racks beside one another, along y [racks]")
-    blocks: int = Field(
-        2, ge=1, le=100, description="the same behind one another, along x [blocks]"
+    racks: int = Field(4, ge=1, le=100, description="number of racks along y [racks]")
+    blocks: int = Field(2, ge=1, le=100, description="number of blocks of racks along x [blocks]")
+    rack_length: float = Field(10.0, gt=0, description="length of a rack along x [m]")
+    rack_depth: float = Field(1.0, gt=0, description="depth of a rack along y [m]")
+    rack_height: float = Field(2.2, gt=0, description="height of a rack [m]")
+    bay: float = Field(
+        1.25, ge=0, description="distance of the uprights of racks; 0 for no pattern [m]"
     )
-    rack_length: float = Field(10.0, gt=0, description="along x [m]")
-    rack_depth: float = Field(1.0, gt=0, description="along y [m]")
-    rack_height: float = Field(2.2, gt=0, description="top of a rack [m]")
-    bay: float = Field(1.25, ge=0, description="spacing of the racks' uprights; 0: no pattern [m]")
-    aisle_width: float = Field(2.5, gt=0, description="between racks [m]")
+    aisle_width: float = Field(2.5, gt=0, description="width of the aisles between racks [m]")
     cross_aisle: float = Field(3.0, gt=0, description="width of the cross aisles [m]")
     pallets: int = Field(
-        6, ge=0, le=10_000, description="pallets that stand in the aisles [pallets]"
+        6, ge=0, le=10_000, description="number of pallets in the aisles [pallets]"
     )
-    wall_thickness: float = Field(0.2, gt=0, description="of the hall's walls [m]")
-    height: float = Field(4.0, gt=0, description="of the hall's walls [m]")
+    wall_thickness: float = Field(0.2, gt=0, description="thickness of the hall's walls [m]")
+    height: float = Field(4.0, gt=0, description="height of the hall's walls [m]")
 
     def check(self) -> None:
-        """Refuse aisles that two pallets close, and racks shorter than a pallet."""
+        """Refuse aisles that two pallets would close, and racks shorter than a pallet."""
         require("aisle_width", self.aisle_width, 2 * PALLET[1], "two pallets")
         require("rack_length", self.rack_length, PALLET[0], "a pallet")
 
     def aisles(self) -> Floats:
-        """Return y of the aisles' centre lines [m, map]."""
+        """Return y of the centre lines of the aisles [m, map]."""
         return self.aisle_width / 2 + self._row * np.arange(self.racks + 1.0)
 
     def cross_aisles(self) -> Floats:
-        """Return x of the cross aisles' centre lines [m, map]."""
+        """Return x of the centre lines of the cross aisles [m, map]."""
         return self.cross_aisle / 2 + self._block * np.arange(self.blocks + 1.0)
 
     def make(self, rng: np.random.Generator) -> World:
-        """Return the hall's walls, the racks, and pallets before some of them."""
+        """Return the world: the hall, the racks, and pallets beside some of them."""
         hall = shapely.box(
             0.0,
             0.0,
