@@ -148,7 +148,7 @@ def _threads(threads: int | None) -> int:
     if threads is None:  # Python 3.13 counts those that this process may use
         return getattr(os, "process_cpu_count", os.cpu_count)() or 1
     if not isinstance(threads, int) or isinstance(threads, bool) or threads < 1:
-        raise ProblemError("threads", "an integer of 1 or more", repr(threads))
+        raise ProblemError("threads", "a whole number of 1 or more", repr(threads))
     return threads
 
 

@@ -192,7 +192,7 @@ def whole_cells(changed: npt.ArrayLike) -> Ints:
     ProblemError
         Another shape, or not integers.
     """
-    expected = "integers [row, col], shape (n, 2)"
+    expected = "whole numbers [row, col], shape (n, 2)"
     try:
         cells = np.asarray(changed)
     except ValueError as error:

@@ -299,7 +299,7 @@ def test_weights_whose_sums_would_overflow_are_refused(planner: str) -> None:
 
 def test_a_distance_field_whose_sums_would_overflow_is_refused() -> None:
     asked = serpentine(1499)
-    with pytest.raises(ProblemError, match="Give smaller weights"):
+    with pytest.raises(ProblemError, match="Use smaller weights"):
         distance_field(asked, asked.start)
 
 

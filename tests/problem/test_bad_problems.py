@@ -59,7 +59,7 @@ def test_maps_need_not_be_square(planner: str, shape: tuple[int, int]) -> None:
 @every_planner
 def test_an_empty_map_has_no_inside(planner: str) -> None:
     with pytest.raises(
-        OutsideMapError, match=r"start \(9.00, 9.00\): .* on an observed tile; the map has"
+        OutsideMapError, match=r"start \(9.00, 9.00\) is outside the map: .* the map has none"
     ):
         plan(problem(ConfidenceGrid()), planner)
 
@@ -114,7 +114,9 @@ def test_places_far_away_are_outside(planner: str, far: float) -> None:
 def test_a_footprint_larger_than_the_map_fits_nowhere(planner: str) -> None:
     with pytest.raises(UnknownSpaceError, match=r"begins \d+\.\d\d m away\. Map .* allow\)\.$"):
         plan(problem(footprint=100.0, clear_start=False), planner)
-    with pytest.raises(ProblemError, match=r"footprint: expected one that leaves \d+ cells of map"):
+    with pytest.raises(
+        ProblemError, match=r"footprint: expected at most \d+ cells in the box around the map"
+    ):
         plan(problem(footprint=1e6), planner)
 
 

@@ -139,7 +139,7 @@ def test_unknown_voxels_near_the_start_count_as_free() -> None:
         ),
         (
             {"clear_start_radius": 500.0},
-            "footprint: expected one that leaves 33554432 cells of map",
+            "footprint: expected at most 33554432 cells in the box around the map",
         ),
     ],
 )
