@@ -1,1 +1,1 @@
-"""The commands of ``groundmap``, one per file, and their console."""
+"""The commands of ``groundmap``, one per file, and their console output."""

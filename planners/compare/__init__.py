@@ -1,1 +1,1 @@
-"""Other ways from views to a map, on the same views."""
+"""Other mapping methods on the same views, to compare with."""
