@@ -29,9 +29,7 @@ class Measures:
     free_precision: float | None  #: share truly free, of free cells
     nonfree_recall: float | None  #: share within 0.3 m of a non-free cell, of surfaces in sight
     nonfree_precision: float | None  #: share within 0.3 m of an obstacle, of non-free cells
-    false_free: (
-        float | None
-    )  #: share in an obstacle, or behind one in every view, of all free cells
+    false_free: float | None  #: share in obstacles or behind them in every view, of free cells
     false_free_beyond_cell: float | None  #: of these, deeper than a cell
     false_free_beyond: float | None  #: of these, deeper than 0.3 m
     false_free_depth: float | None  #: largest distance from the nearest cell that may be free [m]
