@@ -55,7 +55,7 @@ def no_default_limit(monkeypatch: pytest.MonkeyPatch) -> None:
 def ticking(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let time pass only where a search looks at the clock."""
     looks = count()
-    for module in ("engine", "solve", "registry"):
+    for module in ("search.base", "route.solve", "planning"):
         monkeypatch.setattr(f"planners.{module}.now", lambda: TICK * next(looks))
     monkeypatch.setattr(
         "planners.sampling.ompl_states.POLL_INTERVAL", math.inf

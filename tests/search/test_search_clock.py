@@ -44,7 +44,7 @@ def test_the_clock_goes_on_beside_compilation() -> None:
 @pytest.mark.parametrize("planner", sorted(OWN_PLANNERS))
 def test_the_time_limit_counts_from_the_call(planner: str, monkeypatch: pytest.MonkeyPatch) -> None:
     seconds = [0.0]
-    for module in ("engine", "solve", "registry"):
+    for module in ("search.base", "route.solve", "planning"):
         monkeypatch.setattr(f"planners.{module}.now", lambda: seconds[0])
     made = Costmap.of
 
