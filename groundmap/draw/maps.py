@@ -96,6 +96,8 @@ def draw_grid(
     ax = ax or new_figure(box)[1]
     window = grid.window(box, most_cells=MOST_DRAWN)
     rows, cols = window.count.shape
+    if rows * cols == 0:  # a float's step at these coordinates is larger than the box
+        raise InputError("bounds", "a box that holds a cell", str(box.tolist()))
     x, y = window.origin
     picture = ax.imshow(
         _shade(window, epsilon),

@@ -214,10 +214,7 @@ class ConfidenceGrid:
             Evidence that is NaN or beyond [-1, 1], or a cell too far off to count.
         """
         lower = as_cell("lower", lower, self.ndim)
-        z = np.asarray(z)
-        if z.ndim != self.ndim or z.dtype.kind not in "biuf":
-            got = f"{z.dtype} of shape {z.shape}"
-            raise InputError("z", f"evidence in {self.ndim} dimensions", got)
+        z = self._as_evidence(z)
         if not (np.abs(z) <= 1.0).all():
             raise InputError("z", "evidence in [-1, 1]", "NaN or numbers beyond")
         for tile, block in self._tiles.cut(lower, z):
@@ -229,6 +226,16 @@ class ConfidenceGrid:
             index, inner = divmod(cell, self.tile_shape)
             drop_offs = self.tile(tuple(index.tolist())).drop_offs
             drop_offs[tuple(inner)] += drop_offs[tuple(inner)] < MOST_VIEWS
+
+    def _as_evidence(self, z: npt.ArrayLike) -> npt.NDArray[Any]:
+        expected = f"evidence in {self.ndim} dimensions"
+        try:
+            block = np.asarray(z)
+        except ValueError as error:  # rows of several lengths
+            raise InputError("z", expected, format_value(z)) from error
+        if block.ndim != self.ndim or block.dtype.kind not in "biuf":
+            raise InputError("z", expected, f"{block.dtype} of shape {block.shape}")
+        return block
 
     def merge(self, other: ConfidenceGrid) -> ConfidenceGrid:
         """Return a new grid that holds what both saw, as if one mapper had seen all views.

@@ -17,6 +17,8 @@ from planners.errors import ProblemError
 from planners.problem.costs import CostSettings
 from planners.problem.footprint import LARGEST, Footprint
 
+FARTHEST = 1e100  # [m], of start and goal: as far as the origin of a map may be
+
 Pose = tuple[float, ...]  #: x, y [m, map] and optionally yaw [rad]
 
 PLAIN = CostSettings()  # the shortest route is the best
@@ -191,6 +193,8 @@ def _pose(name: str, values: Sequence[float] | Floats, ndim: int) -> tuple[float
     places |= isinstance(values, Sequence) and not isinstance(values, str)
     if not places or len(values) not in (ndim, ndim + 1) or not all(map(is_number, values)):
         raise ProblemError(name, expected, repr(values))
+    if max(map(abs, values[:ndim])) > FARTHEST:
+        raise ProblemError(name, f"a place within {FARTHEST:g} m of the origin", repr(values))
     return tuple(map(float, values))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import warnings
 import zipfile
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -88,7 +89,7 @@ def _entry(arrays: dict[str, Any], draw: Draw) -> None:
 
 def _cast(arrays: dict[str, Any], draw: Draw) -> None:
     name = draw.pick(sorted(arrays))
-    with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
         try:
             arrays[name] = np.asarray(arrays[name]).astype(draw.pick(TYPES))
         except (TypeError, ValueError):

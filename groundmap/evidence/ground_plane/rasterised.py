@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from groundmap.arrays import Floats, Ints
+from groundmap.arrays import FARTHEST_CELL, Floats, Ints
 from groundmap.errors import InputError
 from groundmap.evidence.evidence import Evidence
 from groundmap.evidence.ground_plane.height_classes import GroundView
@@ -14,6 +14,7 @@ from groundmap.evidence.ground_plane.surfaces import SurfaceKind, Surfaces
 from groundmap.evidence.ground_plane.visibility import SightFan
 from groundmap.evidence.uncertainty import MODELS
 from groundmap.grid.grid import ConfidenceGrid
+from groundmap.printable import format_value
 from groundmap.settings import MapperSettings
 
 MARGIN = 1  # [cells] around what is drawn, so that rounding can't push a border cell outside
@@ -46,6 +47,13 @@ def evidence_of(
     discs = surfaces.discs / grid.resolution
     corners = [free, outlines, ends, *_around(cores, caps), *_around(ends, discs[:, None])]
     drawn = np.concatenate([origin[None], *(array.reshape(-1, 2) for array in corners)])
+    if not (np.abs(drawn) < FARTHEST_CELL).all():
+        raise InputError(
+            "view",
+            f"evidence within {FARTHEST_CELL * grid.resolution:.3g} m of the origin",
+            f"a viewpoint at {format_value((origin * grid.resolution).tolist())} m",
+            hint="Is a pose wrong?",
+        )
     lower = np.floor(drawn.min(axis=0)) - MARGIN
     shape = (np.floor(drawn.max(axis=0)) - lower).astype(np.int64) + 1 + MARGIN
     if np.prod(shape.astype(np.float64)) > MOST_CELLS:
