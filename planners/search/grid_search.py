@@ -112,7 +112,8 @@ class GridSearch(ABC):
 
     def _direct_result(self, query: GridQuery) -> SearchResult:
         """Return the straight piece from start to goal."""
-        return SearchResult(self._line(query, query.ends.sources[:0, :-1]), 0)
+        waypoints = self._line(query, query.ends.sources[:0, :-1])
+        return SearchResult(waypoints, 0, cost=length_of(waypoints))
 
     def _to_result(self, query: GridQuery) -> SearchResult:
         waypoints = self._line(query, self._trace())

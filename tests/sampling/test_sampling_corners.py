@@ -87,7 +87,7 @@ def test_a_route_that_ends_at_no_goal_is_caught() -> None:
             return SearchResult(np.array([(2.0, 2.0), (5.0, 2.0)]), 1, goal=(5.0, 2.0))
 
     options = SamplingSettings(goal_radius=1.0)
-    with pytest.raises(AuditError, match=r"ends at no goal at \(5.00, 2.00\)"):
+    with pytest.raises(AuditError, match=r"does not end at a goal at \(5.00, 2.00\)"):
         solve(Costmap.of(asked()), Liar(), options, began=0.0)
 
 

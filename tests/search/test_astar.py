@@ -117,7 +117,7 @@ def shape_of(found: SearchResult | None) -> list[list[float]] | None:
 
 
 def test_no_corner_is_cut_at_radius_zero() -> None:
-    with pytest.raises(EnclosedError, match="no way from start to goal exists"):
+    with pytest.raises(EnclosedError, match="No passage connects start and goal"):
         plan(across("#. .#"))
     assert plan(across(".. .#")).length == pytest.approx(2.0)
     assert plan(across(".. ..")).length == pytest.approx(math.sqrt(2.0))
