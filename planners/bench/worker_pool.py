@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
+import threading
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any, Generic, TypeVar
@@ -32,7 +33,8 @@ class _Worker(Generic[T, R]):
         # A terminal sends Ctrl-C to all processes of the group; only the main process handles it.
         previous = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
-            self.process.start()
+            with _deferred_signals():
+                self.process.start()
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, previous)
         child_pipe.close()
@@ -53,6 +55,27 @@ class _Worker(Generic[T, R]):
         self.process.kill()
         self.process.join()
         self.pipe.close()
+
+
+@contextmanager
+def _deferred_signals() -> Generator[None]:
+    """Handle SIGINT and SIGTERM after the block: a process that starts would miss its task.
+
+    The mask alone does not defer them, since other threads of the process receive them.
+    """
+    received: list[int] = []
+    handlers: dict[int, Any] = {}
+    if threading.current_thread() is threading.main_thread():
+        for kind in (signal.SIGINT, signal.SIGTERM):
+            if callable(signal.getsignal(kind)):
+                handlers[kind] = signal.signal(kind, lambda got, _: received.append(got))
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        for deferred in received:
+            signal.raise_signal(deferred)
 
 
 def worker_pool(

@@ -240,7 +240,9 @@ def test_exceptions_of_ompl_become_a_reason() -> None:
 
 @needs_ompl
 def test_a_path_that_ends_beside_the_goal_is_no_route() -> None:
-    with pytest.raises(UnsolvedError, match=r"in iterations = 3 \(\d+ edges .* m from the goal") as caught:
+    with pytest.raises(
+        UnsolvedError, match=r"in iterations = 3 \(\d+ edges .* m from the goal"
+    ) as caught:
         plan(problem(), "rrt", iterations=3, range=0.5)
     assert caught.value.left is not None
     assert 5.0 < caught.value.left <= math.hypot(8.0, 7.5)
