@@ -17,7 +17,7 @@ from groundmap import CellState, ConfidenceGrid, read_views, write_views
 from planners.commands.app import app
 
 VIEWS = 12
-# The plain square below: 32 x 32 m, a ring of walls in it, and a strip that nobody saw.
+# The plain square below: 32 x 32 m, a ring of walls in it, and a strip that no view saw.
 RESOLUTION = 0.5
 INSIDE_RING, ON_RING, IN_STRIP, BEYOND = "12.5,12.5", "10.25,12.5", "28,5", "90,5"
 

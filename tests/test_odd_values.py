@@ -1,4 +1,4 @@
-"""Values that no caller should give are refused by name, wherever the public API takes values."""
+"""Values that no caller should give are refused by name in the whole public API."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ class ConfidenceGrid:
         Outer corner of cell (0, 0) [m, map]; its length is the grid's dimension (2 or 3).
     frame : str, default "map"
     rule : UpdateRule, optional
-        How views add up, `groundmap.grid.fusion.Average` unless told.
+        How views add up; default: `groundmap.grid.fusion.Average`.
 
     Raises
     ------
@@ -161,7 +161,7 @@ class ConfidenceGrid:
         ----------
         bounds : array_like, shape (2 d,), optional
             Lower then upper corner [m, map], such as (xmin, ymin, xmax, ymax); every cell that
-            the box touches is in. The box around all touched tiles unless told.
+            the box touches is in. Default: the box around all touched tiles.
         most_cells : int, default 2**28
             Cells that the box may hold; each takes 12 bytes.
 

@@ -1,4 +1,4 @@
-"""What one view says: one z per cell, walls before freespace, the same wherever the view stands."""
+"""What one view says: one z per cell, walls before freespace, the same for every view position."""
 
 from __future__ import annotations
 

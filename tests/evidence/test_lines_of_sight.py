@@ -366,7 +366,7 @@ def test_a_doubtful_link_closes_what_nothing_is_seen_through(through: int, range
     assert link.sum() == 1
     assert found.against[link] == through
     assert found.hiding[link] == (through < 2)
-    assert found.features == 0  # a link that nobody believes is not contradicted either
+    assert found.features == 0  # a link that is not believed is not contradicted either
     # It ends sight, but grants nothing: the lines to the posts do, and the ground beyond.
     assert sight(ground_view) == pytest.approx(range_)
 

@@ -157,7 +157,7 @@ def box_cells(left: float, bottom: float, right: float, top: float) -> Bools:
 @settings(max_examples=200)
 @given(st.data())
 def test_triangles_of_one_fan_hold_each_cell_once(data: st.DataObject) -> None:
-    """The fan as a whole and its triangles one by one agree, wherever the borders fall."""
+    """The fan as a whole and its triangles one by one agree, also on the borders."""
     corner = st.tuples(dyadic(0, 32), dyadic(0, 24)).map(np.array)
     origin = data.draw(corner)
     corners = np.array(data.draw(st.lists(corner, min_size=3, max_size=10)))

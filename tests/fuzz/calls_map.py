@@ -307,7 +307,7 @@ def shapes(draw: Draw, _folder: Path) -> None:
 
 
 def world(draw: Draw, _folder: Path) -> None:
-    """Make a world, strew landmarks over it, and observe them."""
+    """Make a world, sample landmarks on it, and observe them."""
     options: dict[str, Any] = {"bounds": array(draw, np.array([0, 0, 8.0, 8.0]), 0.4)}
     for name in ("ground_texture", "ground_lines"):
         options[name] = number(draw, 0, 1, 0.2)

@@ -209,9 +209,11 @@ ROADMAP = {
 def improving(draw: Draw, _folder: Path) -> None:
     """Plan with a planner that tells of its routes."""
     posed: PlanningProblem = problem(draw, odds=0.02)
-    told = draw.noted("on_improved", draw.either(0.3, lambda: odd(draw), lambda: lambda _: None))
+    callback = draw.noted(
+        "on_improved", draw.either(0.3, lambda: odd(draw), lambda: lambda _: None)
+    )
     cancel = draw.noted("cancel", draw.either(0.3, lambda: odd(draw), lambda: None))
-    plan(posed, draw.pick(("ara", "astar")), on_improved=told, cancel=cancel, time_limit=1.0)
+    plan(posed, draw.pick(("ara", "astar")), on_improved=callback, cancel=cancel, time_limit=1.0)
 
 
 def _compiled(names: tuple[str, ...], **given: Any) -> None:

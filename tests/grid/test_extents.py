@@ -120,10 +120,10 @@ def test_plot_refuses_a_far_tile_and_draws_bounds(map_file: Path) -> None:
 
 
 def test_info_works_with_a_far_tile(map_file: Path) -> None:
-    told = run("info", map_file, "--json")
-    assert told.code == 0
-    assert told.json["bounds"] == [0.0, 0.0, 500032.0, 64.0]
-    assert told.json["area_free_m2"] == 128 * 192 * 0.25
+    info = run("info", map_file, "--json")
+    assert info.code == 0
+    assert info.json["bounds"] == [0.0, 0.0, 500032.0, 64.0]
+    assert info.json["area_free_m2"] == 128 * 192 * 0.25
 
 
 class Watched(dict[Index, Tile]):
