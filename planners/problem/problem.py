@@ -17,7 +17,7 @@ from planners.errors import ProblemError
 from planners.problem.costs import CostSettings
 from planners.problem.footprint import LARGEST, Footprint
 
-FARTHEST = 1e100  # [m], of start and goal: as far as the origin of a map may be
+FARTHEST = 1e300  # [m], of start and goal: in cells of any size, still a finite number
 
 Pose = tuple[float, ...]  #: x, y [m, map] and optionally yaw [rad]
 

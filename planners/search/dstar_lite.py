@@ -47,7 +47,7 @@ class DStarLite(CostmapSearch):
     >>> engine.search(problem.start, problem.goal, DStarLiteSettings()).expanded
     45
     >>> grid.fuse(np.array([9, 20]), np.full((1, 1), 1.0, dtype=np.float32))
-    >>> engine.update(costmap.updated([[9, 20]]))
+    >>> engine.update(costmap.with_changes([[9, 20]]))
     >>> result = engine.search((15.5, 9.5), problem.goal, DStarLiteSettings())
     >>> round(result.cost, 2), result.waypoints.tolist()[-1]
     (36.49, [49.5, 9.5])
