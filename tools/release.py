@@ -39,7 +39,8 @@ def main() -> None:
         (ROOT / name).write_text(text, encoding="utf-8")
     git("commit", "--quiet", "--message", f"Release {version}", "--", *texts)
     git("tag", "--annotate", f"v{version}", "--message", f"groundmap {version}")
-    print(f"Committed and tagged v{version}. To publish: git push --follow-tags, then make wheel.")
+    print(f"Committed and tagged v{version}.")
+    print("To publish: git push --follow-tags, then python -m build.")
 
 
 def with_version(text: str, name: str, version: str) -> str:
