@@ -7,13 +7,14 @@ import math
 import numpy as np
 from scipy.spatial import cKDTree
 
-from groundmap.arrays import Floats, Ints
-from planners.audit.boxes import lengths, segment_boxes
-from planners.audit.obstacles import PIECE, TOLERANCE, Obstacles, obstacles_near, pieces_of
+from groundmap.arrays import Bools, Floats, Ints
+from groundmap.grid.window import CellState
+from planners.audit.obstacles import TOLERANCE, Obstacles, gaps, lengths, segment_boxes
 from planners.audit.swept_audit import swept_audit
 from planners.errors import AuditError
 from planners.problem.problem import PlanningProblem
 
+PIECE = 16  # [cells] longest piece of the line whose surroundings are read as one box
 BATCH = 512  # pieces that are checked at once, which bounds the memory
 
 
@@ -22,7 +23,7 @@ def audit(problem: PlanningProblem, waypoints: Floats, *, headings: Floats | Non
 
     The distance from the line to every cell that the footprint must not touch (its square; on a
     3-D map its cube) is at least the footprint's radius, up to a nanometre, and the line enters no
-    such cell. `planners.audit.obstacles.obstacles_near` defines these cells.
+    such cell. `obstacles_near` defines these cells.
 
     With headings, a polygon footprint is swept along the poses instead of the disc around it, and
     must not enter such a cell by more than a nanometre.
@@ -54,7 +55,7 @@ def audit(problem: PlanningProblem, waypoints: Floats, *, headings: Floats | Non
     """
     _check_ends(problem, waypoints, headings)
     tolerance = TOLERANCE + 4.0 * float(np.spacing(np.abs(waypoints).max()))
-    pieces = pieces_of(waypoints, PIECE * problem.grid.resolution)
+    pieces = _pieces_of(waypoints, PIECE * problem.grid.resolution)
     obstacles = obstacles_near(problem, pieces, tolerance)
     if len(obstacles.states) == 0:
         return
@@ -111,3 +112,72 @@ def _check_pairs(
         fault = f"comes too close to {obstacles.name(cell[worst])}"
         place = tuple(nearest[worst].tolist())
         raise AuditError(fault, place, got=float(distance[worst]), needed=radius)
+
+
+def _pieces_of(waypoints: Floats, longest: float) -> tuple[Floats, Floats]:
+    """Return the two ends of straight pieces that together are the line, each of shape (k, d).
+
+    Parameters
+    ----------
+    waypoints : ndarray, shape (n, d), n >= 2 [m, map]
+    longest : float [m]
+        Largest extent of a piece along any axis.
+    """
+    steps = np.diff(waypoints, axis=0)
+    counts = np.maximum(1, np.ceil(np.abs(steps).max(axis=1) / longest)).astype(np.int64)
+    leg = np.repeat(np.arange(len(steps)), counts)
+    nth = np.arange(len(leg)) - np.repeat(np.cumsum(counts) - counts, counts)
+    shares = np.column_stack([nth, nth + 1]) / counts[leg, None]
+    begin, end = (waypoints[leg] + share[:, None] * steps[leg] for share in shares.T)
+    end[shares[:, 1] == 1.0] = waypoints[1:]
+    return begin, end
+
+
+def obstacles_near(
+    problem: PlanningProblem, pieces: tuple[Floats, Floats], tolerance: float
+) -> Obstacles:
+    """Return the cells within reach of the footprint along a line that it must not touch.
+
+    These are the non-free cells and, where the problem avoids unknown space, the unknown and
+    contested ones, including everything outside the map and excluding unknown cells near the start
+    that `PlanningProblem.clear_start` clears.
+
+    Parameters
+    ----------
+    problem : PlanningProblem
+    pieces : tuple of ndarray, each of shape (k, d) [m, map]
+        Ends of the line's pieces.
+    tolerance : float [m]
+        Added to the radius of the cleared area.
+    """
+    low, high = np.minimum(*pieces), np.maximum(*pieces)
+    reach = problem.radius + 2.0 * problem.grid.resolution
+    window = problem.grid.window(
+        np.concatenate([low.min(axis=0) - reach, high.max(axis=0) + reach])
+    )
+    first = np.maximum(window.world_to_cell(low - reach), 0)
+    boxes = np.column_stack([first, window.world_to_cell(high + reach) + 1])
+    differ = np.append(True, (np.diff(boxes, axis=0) != 0).any(axis=1))  # waypoints may be dense
+    near = np.zeros(window.count.shape, dtype=np.bool_)
+    for box in boxes[differ].reshape(-1, 2, near.ndim):
+        near[tuple(map(slice, *box.tolist()))] = True
+    states = window.states(epsilon=problem.epsilon)
+    cells = np.argwhere(near & (states != CellState.FREE))
+    lower = window.origin + cells[:, ::-1] * window.resolution
+    upper = window.origin + (cells[:, ::-1] + 1) * window.resolution
+    obstacles = Obstacles(lower, upper, states[tuple(cells.T)])
+    kept = _forbidden(problem, obstacles, tolerance)
+    return Obstacles(lower[kept], upper[kept], obstacles.states[kept])
+
+
+def _forbidden(problem: PlanningProblem, cells: Obstacles, tolerance: float) -> Bools:
+    """Return which cells that are not free the footprint must not touch."""
+    if not problem.avoids_unknown:
+        nonfree: Bools = cells.states == CellState.NONFREE
+        return nonfree
+    if not problem.clear_start:
+        return np.ones(len(cells.states), dtype=np.bool_)
+    away = lengths(gaps(np.array(problem.clear_place), cells.lower, cells.upper))
+    cleared = (cells.states == CellState.UNKNOWN) & (away <= problem.clear_radius + tolerance)
+    forbidden: Bools = ~cleared
+    return forbidden

@@ -1,4 +1,4 @@
-"""The cells near a route that the footprint must not touch, read from the map itself."""
+"""Obstacles as axis-aligned boxes, and exact distances to them, in any dimension."""
 
 from __future__ import annotations
 
@@ -6,14 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from groundmap.arrays import Bools, Bytes, Floats
+from groundmap.arrays import Bytes, Floats
 from groundmap.grid.window import CellState
-from planners.audit.boxes import gaps, lengths
-from planners.problem.problem import PlanningProblem
 
 TOLERANCE = 1e-9  # [m]
-PIECE = 16  # [cells] longest piece of the line whose surroundings are read as one box
-
 NAMES = {
     CellState.NONFREE: "a non-free cell",
     CellState.UNKNOWN: "an unknown cell",
@@ -33,70 +29,69 @@ class Obstacles(NamedTuple):
         return NAMES[CellState(int(self.states[index]))]
 
 
-def pieces_of(waypoints: Floats, longest: float) -> tuple[Floats, Floats]:
-    """Return the two ends of straight pieces that together are the line, each of shape (k, d).
+def segment_boxes(a: Floats, b: Floats, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
+    """Return the distance between each segment and its box, and the nearest point of the segment.
+
+    The squared distance along a segment is convex, and quadratic between the parameters at which
+    a coordinate passes a face of the box. Its slope is linear there, so the minimum follows by
+    interpolation between the two parameters where the slope changes sign.
 
     Parameters
     ----------
-    waypoints : ndarray, shape (n, d), n >= 2 [m, map]
-    longest : float [m]
-        Largest extent of a piece along any axis.
+    a, b : ndarray, shape (n, d) or (d,)
+        Ends of the segments, or of one segment for all boxes.
+    lower, upper : ndarray, shape (n, d)
+        Corners of the boxes.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Distances.
+    ndarray, shape (n, d)
+        Points of the segments.
+
+    Examples
+    --------
+    >>> box = np.array([[0.0, 0.0, 0.0]]), np.array([[1.0, 1.0, 1.0]])
+    >>> distance, nearest = segment_boxes(np.array([0.0, 3, 0.5]), np.array([3.0, 0, 0.5]), *box)
+    >>> distance.round(3).tolist(), nearest.tolist()
+    ([0.707], [[1.5, 1.5, 0.5]])
     """
-    steps = np.diff(waypoints, axis=0)
-    counts = np.maximum(1, np.ceil(np.abs(steps).max(axis=1) / longest)).astype(np.int64)
-    leg = np.repeat(np.arange(len(steps)), counts)
-    nth = np.arange(len(leg)) - np.repeat(np.cumsum(counts) - counts, counts)
-    shares = np.column_stack([nth, nth + 1]) / counts[leg, None]
-    begin, end = (waypoints[leg] + share[:, None] * steps[leg] for share in shares.T)
-    end[shares[:, 1] == 1.0] = waypoints[1:]
-    return begin, end
+    step = b - a
+    parameters = [np.zeros((len(lower), 1)), np.ones((len(lower), 1))]
+    for faces in (lower, upper):
+        crossings = np.divide(faces - a, step, out=np.zeros_like(faces), where=step != 0)
+        parameters.append(np.clip(crossings, 0.0, 1.0))
+    t = np.sort(np.concatenate(parameters, axis=1), axis=1)
+    steps = np.expand_dims(step, -2)
+    points = np.expand_dims(a, -2) + t[..., None] * steps
+    slope = (gaps(points, lower[:, None], upper[:, None]) * steps).sum(axis=-1)
+    last = np.maximum((slope < 0).sum(axis=1), 1)  # the slope never decreases along t
+    first = last - 1
+    boxes = np.arange(len(lower))
+    last = np.minimum(last, t.shape[1] - 1)
+    before, after = slope[boxes, first], slope[boxes, last]
+    share = np.divide(-before, after - before, out=np.zeros_like(before), where=after > before)
+    share = np.clip(share, 0.0, 1.0)
+    best = t[boxes, first] + share * (t[boxes, last] - t[boxes, first])
+    nearest = a + best[:, None] * step
+    return lengths(gaps(nearest, lower, upper)), nearest
 
 
-def obstacles_near(
-    problem: PlanningProblem, pieces: tuple[Floats, Floats], tolerance: float
-) -> Obstacles:
-    """Return the cells within reach of the footprint along a line that it must not touch.
-
-    These are the non-free cells and, where the problem avoids unknown space, the unknown and
-    contested ones, including everything outside the map and excluding unknown cells near the start
-    that `PlanningProblem.clear_start` clears.
+def gaps(points: Floats, lower: Floats, upper: Floats) -> Floats:
+    """Return how far coordinates lie outside intervals: negative below them, 0 inside.
 
     Parameters
     ----------
-    problem : PlanningProblem
-    pieces : tuple of ndarray, each of shape (k, d) [m, map]
-        Ends of the line's pieces.
-    tolerance : float [m]
-        Added to the radius of the cleared area.
+    points : ndarray, shape (..., d)
+    lower, upper : ndarray, shape (..., d)
+        Ends of the intervals.
     """
-    low, high = np.minimum(*pieces), np.maximum(*pieces)
-    reach = problem.radius + 2.0 * problem.grid.resolution
-    window = problem.grid.window(
-        np.concatenate([low.min(axis=0) - reach, high.max(axis=0) + reach])
-    )
-    first = np.maximum(window.world_to_cell(low - reach), 0)
-    boxes = np.column_stack([first, window.world_to_cell(high + reach) + 1])
-    differ = np.append(True, (np.diff(boxes, axis=0) != 0).any(axis=1))  # waypoints may be dense
-    near = np.zeros(window.count.shape, dtype=np.bool_)
-    for box in boxes[differ].reshape(-1, 2, near.ndim):
-        near[tuple(map(slice, *box.tolist()))] = True
-    states = window.states(epsilon=problem.epsilon)
-    cells = np.argwhere(near & (states != CellState.FREE))
-    lower = window.origin + cells[:, ::-1] * window.resolution
-    upper = window.origin + (cells[:, ::-1] + 1) * window.resolution
-    obstacles = Obstacles(lower, upper, states[tuple(cells.T)])
-    kept = _forbidden(problem, obstacles, tolerance)
-    return Obstacles(lower[kept], upper[kept], obstacles.states[kept])
+    outside: Floats = np.minimum(points - lower, 0.0) + np.maximum(points - upper, 0.0)
+    return outside
 
 
-def _forbidden(problem: PlanningProblem, cells: Obstacles, tolerance: float) -> Bools:
-    """Return which cells that are not free the footprint must not touch."""
-    if not problem.avoids_unknown:
-        nonfree: Bools = cells.states == CellState.NONFREE
-        return nonfree
-    if not problem.clear_start:
-        return np.ones(len(cells.states), dtype=np.bool_)
-    away = lengths(gaps(np.array(problem.clear_place), cells.lower, cells.upper))
-    cleared = (cells.states == CellState.UNKNOWN) & (away <= problem.clear_radius + tolerance)
-    forbidden: Bools = ~cleared
-    return forbidden
+def lengths(vectors: Floats) -> Floats:
+    """Return the lengths of vectors, shape (n, d)."""
+    norms: Floats = np.sqrt((vectors * vectors).sum(axis=-1))
+    return norms

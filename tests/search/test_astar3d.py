@@ -20,7 +20,7 @@ from groundmap.arrays import Bools, Floats
 from groundmap.grid.grid import ConfidenceGrid
 from planners import AuditError, CostSettings, PlanningProblem, ProblemError, TimeLimitError
 from planners.audit.audit import audit
-from planners.audit.boxes import segment_boxes
+from planners.audit.obstacles import segment_boxes
 from planners.costmap.kernels.distance import NOWHERE, squared_distances_3d
 from planners.costmap.voxel_map import Voxels
 from planners.geometry.kernels.clearance3d import cube_distance, line_clearance
