@@ -11,7 +11,7 @@ import numpy as np
 from groundmap.arrays import Floats, Ints
 from groundmap.evidence.evidence import Evidence
 from groundmap.evidence.ground_plane.height_classes import GroundView, flatten
-from groundmap.evidence.ground_plane.rasterised import drop_off_cells, evidence_of
+from groundmap.evidence.ground_plane.rasterised import evidence_of
 from groundmap.evidence.ground_plane.ray_smoothing import smooth_features
 from groundmap.evidence.ground_plane.surfaces import Surfaces, find_surfaces
 from groundmap.evidence.ground_plane.visibility import SightFan, visible_freespace
@@ -24,6 +24,9 @@ from groundmap.view.frames import map_from_world
 from groundmap.view.ground_plane import GroundPlane
 from groundmap.view.stereo_rig import StereoRig
 from groundmap.view.view import View
+
+# Heights that evidence is kept apart by [step_height]. Below the lowest, sight touches the ground.
+SIGHT_STEPS = (1 / 3, 1.0, 4.0)
 
 
 @dataclass
@@ -99,6 +102,7 @@ class GroundMapper:
             resolution=self.settings.resolution,
             frame=self.settings.frame,
             rule=RULES[self.settings.fusion](**parameters),
+            heights=tuple(share * self.settings.step_height for share in SIGHT_STEPS),
         )
         self.stats = MapperStats()
         self.stages = stages or Stopwatch()
@@ -122,11 +126,8 @@ class GroundMapper:
         """
         parts = self.explain(view)
         with self.stages.measure("fuse"):
-            lower, z = parts.evidence.lower, parts.evidence.z
-            drop_offs = drop_off_cells(parts.ground_view, self.grid)
-            self.grid.fuse(lower, z)
-            self.grid.add_drop_offs(drop_offs)
-            self.changed = np.concatenate([np.argwhere(z) + lower, drop_offs])
+            self.grid.fuse(*parts.evidence)
+            self.changed = parts.evidence.cells()
             self.grid.trajectory = np.concatenate([self.grid.trajectory, _pose2d(view)])
         self.stats.views += 1
         self.stats.features_used += parts.ground_view.used

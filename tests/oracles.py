@@ -181,6 +181,21 @@ def gap_chords(bearings: Floats, ranges: Floats, widest: float) -> Floats:
     return chords
 
 
+def usual_gap(bearings: Floats, ranges: Floats, least: float, most: float) -> float:
+    """Return four times the gap that four in five neighbouring lines leave, within bounds.
+
+    Two lines are neighbours if all lines between them are shorter than both.
+    """
+    order = np.argsort(bearings, kind="stable")
+    bearings, ranges = bearings[order], ranges[order]
+    gaps = []
+    for i, j in combinations(range(len(bearings)), 2):
+        both, angle = min(ranges[i], ranges[j]), bearings[j] - bearings[i]
+        if (ranges[i + 1 : j] < both).all() and 1e-9 < angle < 1.5:
+            gaps.append(2 * both * np.sin(angle / 2))
+    return min(max(4.0 * float(np.quantile(gaps, 0.8)), least), most) if gaps else most
+
+
 def farthest(chords: Floats, bearings: Floats) -> Floats:
     """Range of the farthest edge at each bearing; 0 where there is none."""
     inverse = inverse_ranges(chords, bearings)

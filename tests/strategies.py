@@ -151,6 +151,7 @@ def flat_view(
     camera_height: float = 1.0,
     drop_offs: npt.ArrayLike = (),
     drop_off_heights: npt.ArrayLike = -1.0,
+    drop_off_sureness: float = 1.0,
     border: float = np.inf,
     baseline: float = 0.0,
     viewpoint: tuple[float, float] = (0.0, 0.0),
@@ -171,6 +172,7 @@ def flat_view(
         feature[b] = feature[a]  # both ends are of one feature
     return GroundView(
         viewpoint=np.array(viewpoint),
+        base=np.empty((0, 2)),  # no wheels
         forward=np.array(forward),
         camera_height=camera_height,
         border=border,
@@ -188,6 +190,7 @@ def flat_view(
         drop_off_heights=np.broadcast_to(
             np.asarray(drop_off_heights, dtype=np.float64), len(below)
         ).copy(),
+        drop_off_sureness=np.full(len(below), drop_off_sureness),
         used=len(xy) + len(ground),
         dropped=Counter(),
     )

@@ -18,6 +18,8 @@ class Evidence(NamedTuple):
 
     lower: Ints  #: shape (2,), cell ``[row, col]`` of the block's first entry
     z: Floats32  #: shape (rows, cols), in [-1, 1]; 0 says nothing
+    #: shape (rows, cols) [m], see `groundmap.ConfidenceGrid.fuse`; None where heights play no part
+    height: Floats32 | None = None
 
     def cells(self) -> Ints:
         """Return the cells ``[row, col]`` that are spoken of, shape (n, 2)."""

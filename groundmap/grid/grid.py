@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from os import PathLike
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +14,6 @@ from groundmap.arrays import (
     Floats32,
     Ints,
     as_cell,
-    as_cells,
     as_floats,
     check_finite,
     is_number,
@@ -23,14 +21,16 @@ from groundmap.arrays import (
 from groundmap.errors import FileFormatError, InputError, MergeError
 from groundmap.files.archive import read_archive, write_archive
 from groundmap.grid.extents import cells_of_box, check_size, check_whole
-from groundmap.grid.fusion import MOST_VIEWS, Average, UpdateRule, rule_from
+from groundmap.grid.fusion import Average, UpdateRule, rule_from
+from groundmap.grid.height_layers import SIGHT_HEIGHTS, HeightLayers, as_heights
+from groundmap.grid.old_versions import upgrade
 from groundmap.grid.tiles import LAYERS, TILE_SHAPES, Index, Tile, Tiles
 from groundmap.grid.window import CellState, GridWindow, cells_of
 from groundmap.printable import format_value, is_plain
 
-FORMAT, VERSION = "groundmap-grid", 1
+FORMAT, VERSION = "groundmap-grid", 2
 SMALLEST, LARGEST, FARTHEST = 1e-9, 1e9, 1e100  # [m] cells and origin; areas are then numbers
-MOST_CELLS = 2**28  # of a dense window: 3 GiB
+MOST_CELLS = 2**28  # of a dense window: 2 GiB
 
 
 class ConfidenceGrid:
@@ -45,6 +45,8 @@ class ConfidenceGrid:
     frame : str, default "map"
     rule : UpdateRule, optional
         How views add up; default: `groundmap.grid.fusion.Average`.
+    heights : tuple of float, default (0.05, 0.15, 0.6) [m]
+        Heights that evidence is kept apart by, see `groundmap.grid.height_layers.HeightLayers`.
 
     Raises
     ------
@@ -67,6 +69,7 @@ class ConfidenceGrid:
         origin: Sequence[float] = (0.0, 0.0),
         frame: str = "map",
         rule: UpdateRule | None = None,
+        heights: tuple[float, ...] = SIGHT_HEIGHTS,
     ) -> None:
         if not isinstance(frame, str):
             raise InputError("frame", "a name", format_value(frame))
@@ -87,6 +90,7 @@ class ConfidenceGrid:
             raise InputError("origin", f"numbers up to {FARTHEST:g} m", str(self.origin.tolist()))
         self.frame, self.rule = frame, rule or Average()
         self._tiles = Tiles(len(origin))
+        self._layers = HeightLayers(len(origin), heights)
         #: Base poses the map was seen from, shape (n, 3): x, y [m], yaw [rad], frame map.
         self.trajectory: Floats = np.empty((0, 3))
 
@@ -103,10 +107,15 @@ class ConfidenceGrid:
     @property
     def nbytes(self) -> int:
         """Memory held by the tiles [bytes]."""
-        return self._tiles.nbytes
+        return self._tiles.nbytes + self._layers.nbytes
+
+    @property
+    def heights(self) -> tuple[float, ...]:
+        """Heights that evidence is kept apart by [m]."""
+        return self._layers.heights
 
     def tile(self, index: Index) -> Tile:
-        """Return the tile of that index, allocated on first touch."""
+        """Return the tile of that index, allocated on first touch: evidence of any height."""
         if np.ndim(index) != 1:
             raise InputError("index", f"{self.ndim} whole numbers", repr(index)[:60])
         return self._tiles.touch(tuple(as_cell("index", index, self.ndim).tolist()))
@@ -119,18 +128,22 @@ class ConfidenceGrid:
         """Whether the tile of that index was touched."""
         return self._tiles.get(index) is not None
 
+    def layer_tiles(self, layer: int) -> Iterator[tuple[Index, Tile]]:
+        """Iterate over (index, tile) of the evidence below one of `heights`, in their order."""
+        return self._layers.tiles(layer)
+
     def confidence_at(self, xy: npt.ArrayLike) -> float | Floats32:
         """Return the confidence at map positions (x, y) [m]; 0 where nothing was seen."""
-        values: Floats32 = self._at(xy, "confidence")
+        cells = cells_of(xy, self.origin, self.resolution)
+        values: Floats32 = self._tiles.values_at(cells, "confidence")
+        self._layers.raise_at(values, cells)
         return float(values[0]) if np.ndim(xy) == 1 else values
 
     def count_at(self, xy: npt.ArrayLike) -> int | Counts:
         """Return the update count at map positions (x, y) [m]; 0 is unknown."""
-        values: Counts = self._at(xy, "count")
+        cells = cells_of(xy, self.origin, self.resolution)
+        values: Counts = self._tiles.values_at(cells, "count")
         return int(values[0]) if np.ndim(xy) == 1 else values
-
-    def _at(self, xy: npt.ArrayLike, layer: str) -> npt.NDArray[Any]:
-        return self._tiles.values_at(cells_of(xy, self.origin, self.resolution), layer)
 
     def cell_bounds(self) -> tuple[Ints, Ints]:
         """Return the first cell of the touched tiles and the cell past the last."""
@@ -163,7 +176,7 @@ class ConfidenceGrid:
             Lower then upper corner [m, map], such as (xmin, ymin, xmax, ymax); every cell that
             the box touches is in. Default: the box around all touched tiles.
         most_cells : int, default 2**28
-            Cells that the box may hold; each takes 12 bytes.
+            Cells that the box may hold; each takes 8 bytes.
 
         Raises
         ------
@@ -179,10 +192,10 @@ class ConfidenceGrid:
             lower, upper = cells_of_box(bounds, self.origin, self.resolution)
             check_size(lower, upper, most_cells, self.resolution)
         dense = self._tiles.read(lower, upper)
+        self._layers.raise_confidence(dense.confidence, lower, upper)
         return GridWindow(
             dense.confidence,
             dense.count,
-            dense.drop_offs,
             origin=self.origin + lower[::-1] * self.resolution,
             resolution=self.resolution,
         )
@@ -191,14 +204,14 @@ class ConfidenceGrid:
         """Return the area in that state [m²] (volume [m³] in 3-D)."""
         # Tile by tile: a dense window would take the memory of the bounding box.
         cells = 0
-        for _, tile in self.tiles():
-            window = GridWindow(
-                tile.confidence, tile.count, tile.drop_offs, self.origin, self.resolution
-            )
+        for index, tile in self.tiles():
+            confidence = tile.confidence.copy()
+            self._layers.raise_tile(confidence, index)
+            window = GridWindow(confidence, tile.count, self.origin, self.resolution)
             cells += int((window.states() == state).sum())
         return cells * self.resolution**self.ndim
 
-    def fuse(self, lower: Ints, z: Floats32) -> None:
+    def fuse(self, lower: Ints, z: Floats32, height: Floats32 | None = None) -> None:
         """Add what one view says (paper, section 5.2, equation 1, with the default rule).
 
         Parameters
@@ -207,25 +220,28 @@ class ConfidenceGrid:
             Cell of the block's first entry, ``[row, col]``.
         z : ndarray of float32
             Evidence per cell in [-1, 1]; 0 says nothing and changes nothing.
+        height : ndarray of float32, optional [m]
+            Where z < 0 the height of the lowest line of sight over the cell, where z > 0 the top
+            of what was seen in it (below 0 for a drop-off, infinite where it is not known). Free
+            evidence never outvotes a top that all lines of sight passed above, if more than one
+            view saw it. Without heights, evidence of any kind outvotes any other.
 
         Raises
         ------
         InputError
-            Evidence that is NaN or beyond [-1, 1], or a cell too far off to count.
+            Evidence that is NaN or beyond [-1, 1], or a cell too far off to count; heights that
+            are NaN or of another shape.
         """
         lower = as_cell("lower", lower, self.ndim)
         z = self._as_evidence(z)
         if not (np.abs(z) <= 1.0).all():
             raise InputError("z", "evidence in [-1, 1]", "NaN or numbers beyond")
+        if height is not None:
+            height = as_heights(height, np.shape(z))
         for tile, block in self._tiles.cut(lower, z):
             self.rule.update(tile.confidence, tile.count, block)
-
-    def add_drop_offs(self, cells: Ints) -> None:
-        """Count one more view that saw ground below the ground plane in these cells."""
-        for cell in np.unique(as_cells("cells", cells, self.ndim), axis=0):
-            index, inner = divmod(cell, self.tile_shape)
-            drop_offs = self.tile(tuple(index.tolist())).drop_offs
-            drop_offs[tuple(inner)] += drop_offs[tuple(inner)] < MOST_VIEWS
+        if height is not None:
+            self._layers.fuse(lower, z, height, self.rule)
 
     def _as_evidence(self, z: npt.ArrayLike) -> npt.NDArray[Any]:
         expected = f"evidence in {self.ndim} dimensions"
@@ -258,12 +274,12 @@ class ConfidenceGrid:
         for index, theirs in other.tiles():
             ours = merged.tile(index)
             self.rule.merge(ours.confidence, ours.count, theirs.confidence, theirs.count)
-            ours.drop_offs[...] += np.minimum(theirs.drop_offs, MOST_VIEWS - ours.drop_offs)
+        merged._layers.merge(other._layers, self.rule)
         merged.trajectory = np.concatenate([self.trajectory, other.trajectory])
         return merged
 
     def _check_merge(self, other: ConfidenceGrid) -> None:
-        for name in ("resolution", "frame", "rule", "origin"):
+        for name in ("resolution", "frame", "rule", "origin", "heights"):
             ours, theirs = getattr(self, name), getattr(other, name)
             if not np.array_equal(ours, theirs):
                 raise MergeError(f"maps add up only with one {name}: expected {ours}, got {theirs}")
@@ -280,7 +296,9 @@ class ConfidenceGrid:
             origin=self.origin.tolist(),
             frame=self.frame,
             rule=self.rule,
+            heights=self.heights,
         )
+        twin._layers.copy_from(self._layers)
         for index, tile in self.tiles():
             mine = twin.tile(index)
             for layer in LAYERS:
@@ -303,13 +321,18 @@ class ConfidenceGrid:
             "origin": self.origin.tolist(),
             "frame": self.frame,
             "rule": self.rule.to_dict(),
+            "heights": self.heights,
         }
-        arrays = {**self._tiles.to_arrays(), "trajectory": self.trajectory}
+        arrays = {
+            **self._tiles.to_arrays(),
+            **self._layers.to_arrays(),
+            "trajectory": self.trajectory,
+        }
         write_archive(path, header, arrays)
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> ConfidenceGrid:
-        """Read a grid that `save` wrote.
+        """Read a grid that `save` wrote, in this version or an older one.
 
         Raises
         ------
@@ -318,13 +341,16 @@ class ConfidenceGrid:
         """
         header, arrays = read_archive(path, FORMAT, VERSION)
         try:
+            header, arrays = upgrade(header, arrays)
             grid = cls(
                 resolution=header["resolution"],
                 origin=header["origin"],
                 frame=header["frame"],
                 rule=rule_from(header["rule"]),
+                heights=tuple(header["heights"]),
             )
             grid._tiles = Tiles.from_arrays(grid.ndim, arrays)
+            grid._layers = HeightLayers.from_arrays(grid.ndim, grid.heights, arrays)
             grid.trajectory = as_floats("trajectory", arrays["trajectory"], (None, 3))
             check_finite("trajectory", grid.trajectory)
         except (KeyError, TypeError, ValueError) as error:

@@ -15,7 +15,7 @@ from groundmap.arrays import FARTHEST_CELL, Bools, Counts, Floats32, Ints
 from groundmap.errors import InputError
 
 TILE_SHAPES = {2: (64, 64), 3: (16, 16, 16)}
-LAYERS = {"confidence": np.float32, "count": np.uint32, "drop_offs": np.uint32}
+LAYERS = {"confidence": np.float32, "count": np.uint32}
 
 Index = tuple[int, ...]
 
@@ -26,7 +26,6 @@ class Tile:
 
     confidence: Floats32
     count: Counts
-    drop_offs: Counts  #: views that saw ground below the ground plane here
 
 
 class Tiles:

@@ -24,7 +24,6 @@ from groundmap.arrays import (
 from groundmap.errors import InputError
 
 EPSILON = 0.01  # |confidence| below this is contested
-DROP_OFF_VIEWS = 3  # a drop-off seen in this many views is non-free, whatever the average says
 
 
 class CellState(IntEnum):
@@ -32,7 +31,7 @@ class CellState(IntEnum):
 
     UNKNOWN = 0  #: never said anything about
     FREE = 1  #: confidence <= -epsilon
-    NONFREE = 2  #: confidence >= epsilon, or a drop-off
+    NONFREE = 2  #: confidence >= epsilon
     CONTESTED = 3  #: in between: the views contradict each other
 
 
@@ -43,9 +42,9 @@ class GridWindow:
     Attributes
     ----------
     confidence : ndarray of float32
-        Freespace below zero, non-freespace above.
-    count, drop_offs : ndarray of uint32
-        Views that spoke of the cell; views that saw a drop-off there.
+        Freespace below zero, non-freespace above: the surest of what is known at any height.
+    count : ndarray of uint32
+        Views that spoke of the cell.
     origin : ndarray, shape (d,) [m, map]
         Outer corner of cell (0, 0), x first.
     resolution : float [m]
@@ -53,7 +52,6 @@ class GridWindow:
 
     confidence: Floats32
     count: Counts
-    drop_offs: Counts
     origin: Floats
     resolution: float
 
@@ -71,7 +69,6 @@ class GridWindow:
         states[self.confidence <= -epsilon] = CellState.FREE
         states[self.confidence >= epsilon] = CellState.NONFREE
         states[self.count == 0] = CellState.UNKNOWN
-        states[self.drop_offs >= DROP_OFF_VIEWS] = CellState.NONFREE
         return states
 
     def world_to_cell(self, xy: npt.ArrayLike) -> Ints:

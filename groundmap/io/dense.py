@@ -42,7 +42,7 @@ def write_dense(
 ) -> None:
     """Write the dense arrays of a map to a file for `numpy.load`.
 
-    ``confidence`` (float32), ``count`` and ``drop_offs`` (uint32) are indexed ``[row, col]``,
+    ``confidence`` (float32) and ``count`` (uint32) are indexed ``[row, col]``,
     ``[layer, row, col]`` in 3-D; ``resolution`` [m/cell]; ``origin`` (x, y) [m, map] is the outer
     corner of cell (0, 0).
 
@@ -68,7 +68,6 @@ def write_dense(
             allow_pickle=False,
             confidence=window.confidence,
             count=window.count,
-            drop_offs=window.drop_offs,
             resolution=np.float64(window.resolution),
             origin=window.origin,
         )

@@ -10,7 +10,7 @@ from groundmap import GroundMapper, View
 from groundmap.arrays import Floats, Ints
 from groundmap.evidence.evidence import Evidence
 from groundmap.evidence.ground_plane.height_classes import GroundView, flatten
-from groundmap.evidence.ground_plane.rasterised import drop_off_cells
+from groundmap.evidence.ground_plane.rasterised import with_drop_offs
 from groundmap.grid.grid import ConfidenceGrid
 from groundmap.settings import MapperSettings
 from planners.compare.kernels.raycast import cast_rays
@@ -49,8 +49,7 @@ class RayCaster:
         """
         ground_view = flatten(view, self.settings)
         evidence = rays_of(ground_view, self.grid)
-        self.grid.fuse(evidence.lower, evidence.z)
-        self.grid.add_drop_offs(drop_off_cells(ground_view, self.grid))
+        self.grid.fuse(*with_drop_offs(evidence, ground_view, self.grid))
 
 
 def rays_of(ground_view: GroundView, grid: ConfidenceGrid) -> Evidence:

@@ -212,7 +212,7 @@ def _slices(first: Ints, last: Ints) -> tuple[slice, slice]:
 
 def _patch(window: GridWindow, part: GridWindow, box: tuple[slice, slice]) -> GridWindow:
     """Return a copy of a window in which a part is replaced."""
-    names = ("confidence", "count", "drop_offs")
+    names = ("confidence", "count")
     arrays = {name: getattr(window, name).copy() for name in names}
     for name in names:
         arrays[name][box] = getattr(part, name)

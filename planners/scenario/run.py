@@ -120,7 +120,6 @@ def _picture(simulated: Simulated, answers: list[QueryOutcome], title: str) -> b
         window=GridWindow(
             window.confidence[part],
             window.count[part],
-            window.drop_offs[part],
             window.origin + low[::-1] * window.resolution,
             window.resolution,
         ),

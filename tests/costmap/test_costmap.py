@@ -141,8 +141,10 @@ def test_clear_start_never_clears_nonfree_or_contested_cells() -> None:
 
 def test_drop_offs_are_nonfree() -> None:
     grid = grid_of(free_field(8, 8))
-    for _ in range(3):
-        grid.add_drop_offs(np.array([[3, 3]]))
+    # Sight over the hole, however often it was free, says nothing about what is below it.
+    hole = np.ones((1, 1), np.float32), np.full((1, 1), -0.5, np.float32)
+    for _ in range(2):
+        grid.fuse(np.array([3, 3]), *hole)
     costmap = Costmap.of(PlanningProblem(grid, start=(1, 1), goal=(6, 6), footprint=0.2))
     assert costmap.nonfree.sum() == 1
 

@@ -211,7 +211,7 @@ def test_neighbours_say_what_all_pairs_of_lines_say(
     bearings, ranges = random_lines(rng)
     ts = rng.uniform(-np.pi, np.pi, size=400)
     np.testing.assert_allclose(
-        farthest(gap_chords(bearings, ranges, widest), ts),
+        farthest(gap_chords(bearings, ranges, np.zeros(len(ranges)), 1.0, widest)[0], ts),
         farthest(all_chords(bearings, ranges, widest), ts),
         rtol=1e-9,
     )
@@ -224,7 +224,7 @@ def test_a_place_is_vouched_for_if_the_lines_beside_it_are_near_enough_there(
 ) -> None:
     bearings, ranges = random_lines(rng)
     ts, rhos = rng.uniform(-3.1, 3.1, size=300), rng.uniform(0.05, 12.0, size=300)
-    reached = farthest(gap_chords(bearings, ranges, widest), ts)
+    reached = farthest(gap_chords(bearings, ranges, np.zeros(len(ranges)), 1.0, widest)[0], ts)
     for t, rho, range_ in zip(ts, rhos, reached, strict=True):
         right, left = (
             bearings[(ranges >= rho) & (bearings <= t)],
@@ -240,7 +240,23 @@ def test_a_place_is_vouched_for_if_the_lines_beside_it_are_near_enough_there(
 
 
 def test_chords_turn_counter_clockwise() -> None:
-    chords = gap_chords(*random_lines(np.random.default_rng(1)), 0.8)
+    bearings, ranges = random_lines(np.random.default_rng(1))
+    chords, _ = gap_chords(bearings, ranges, np.zeros(len(ranges)), 1.0, 0.8)
     assert len(chords) > 10
     first, last = np.moveaxis(chords, 1, 0)
     assert (first[:, 0] * last[:, 1] - first[:, 1] * last[:, 0] > 0).all()
+
+
+@settings(max_examples=100)
+@given(rngs(), st.sampled_from([0.3, 3.0]))
+def test_the_ends_of_a_chord_are_on_its_lines_of_sight(
+    rng: np.random.Generator, widest: float
+) -> None:
+    bearings, ranges = random_lines(rng)
+    heights, eye = rng.uniform(0.0, 1.0, size=len(ranges)), float(rng.uniform(0.5, 2.0))
+    chords, ends = gap_chords(bearings, ranges, heights, eye, widest)
+    for (x, y), height in zip(chords.reshape(-1, 2), ends.reshape(-1), strict=True):
+        on_line = np.abs(np.arctan2(y, x) - bearings) < 1e-9
+        shares = np.hypot(x, y) / ranges[on_line]
+        there = eye * (1 - shares) + shares * heights[on_line]
+        assert np.abs(there - height).min() < 1e-9

@@ -16,7 +16,7 @@ from groundmap.arrays import Bools, Floats
 from groundmap.errors import InputError
 from groundmap.evidence.evidence import Evidence
 from groundmap.evidence.ground_plane.height_classes import GroundView
-from groundmap.evidence.ground_plane.rasterised import drop_off_cells, evidence_of
+from groundmap.evidence.ground_plane.rasterised import evidence_of
 from groundmap.evidence.ground_plane.surfaces import SurfaceKind, find_surfaces
 from groundmap.evidence.ground_plane.visibility import visible_freespace
 from groundmap.evidence.triangulation import triangulate
@@ -36,7 +36,7 @@ def explained(view: View, **options: Any) -> ViewParts:
 
 
 def by_hand(ground_view: GroundView, **options: Any) -> ViewParts:
-    """The steps of `GroundMapper.explain` from a flat view on."""
+    """The steps of `GroundMapper.explain` from a ground_view view on."""
     chosen = MapperSettings(**{"resolution": RESOLUTION, **options})
     mesh = triangulate(ground_view.points, ground_view.segments)
     surfaces = find_surfaces(ground_view, mesh, chosen)
@@ -77,9 +77,14 @@ def on(parts: ViewParts) -> Floats:
 
 
 def loudest(parts: ViewParts, shapes: Floats, values: Floats) -> None:
-    """Check that no cell is less free than the surest of the shapes that touch it makes it."""
-    z = said(parts.evidence)
-    nonfree = [cell for cell, value in z.items() if value > 0]
+    """Check that no cell is less free than the surest of the shapes that touch it makes it.
+
+    Cells without ground, which are below 0, are left out.
+    """
+    z, height = said(parts.evidence), parts.evidence.height
+    assert height is not None
+    above = set(map(tuple, (np.argwhere(height >= 0) + parts.evidence.lower).tolist()))
+    nonfree = [cell for cell, value in z.items() if value > 0 and cell in above]
     most = np.zeros(len(nonfree))
     cell, shape = shapely.STRtree(shapes).query(boxes(nonfree), "dwithin", distance=SLACK)
     np.maximum.at(most, cell, values[shape])
@@ -131,7 +136,11 @@ def test_each_cell_is_spoken_of_once_and_within_bounds(view: View, model: str) -
     assert (np.abs(evidence.z) <= 1.0).all()
     cells = evidence.cells()
     assert len(np.unique(cells, axis=0)) == len(cells) == np.count_nonzero(evidence.z)
-    assert set(np.unique(evidence.z[evidence.z < 0])) <= {np.float32(-1.0)}
+    assert evidence.height is not None
+    free = evidence.z < 0
+    # The lower the lowest line of sight, the surer: -1 on the ground, -0.25 above 0.45 m.
+    expected = -np.clip(1.0 - evidence.height[free] / 0.6, 0.25, 1.0)
+    np.testing.assert_allclose(evidence.z[free], expected, rtol=1e-6)
 
 
 @settings(max_examples=40)
@@ -215,7 +224,9 @@ def test_free_cells_are_those_of_the_fan_that_no_surface_claims(view: View, mode
         shapely.buffer(shapely.polygons(in_map(parts.ground_view, triangles)), 1e-10)
     )
     x, y = np.moveaxis(middles(parts.evidence), -1, 0)
-    inside = shapely.contains_xy(fan, x, y)
+    base = in_map(parts.ground_view, parts.ground_view.base)[0]
+    wheels = np.hypot(x - base[0], y - base[1]) <= 0.5  # of the narrowest footprint, 1 m
+    inside = shapely.contains_xy(fan, x, y) | wheels
     np.testing.assert_array_equal(parts.evidence.z < 0, inside & (parts.evidence.z <= 0))
 
 
@@ -300,10 +311,10 @@ def test_a_ghost_is_drawn_as_weakly_as_it_is_believed(model: str, through: int, 
 def test_a_doubtful_link_is_not_drawn_and_hides_what_is_behind_it() -> None:
     ground_view = flat_view([(5.06, -0.6), (5.06, 0.6)], heights=0.4, supports=[(8.0, 0.0)])
     cells = said(by_hand(ground_view).evidence)
-    assert cells[(0, 39)] == -1.0
+    assert cells[(0, 39)] < 0.0
     assert not any(row in range(-3, 3) and col > 40 for row, col in cells)
     assert not any(row in range(-3, 3) and z > 0 for (row, _), z in cells.items())
-    assert said(by_hand(ground_view, doubt=1.0).evidence)[(0, 60)] == -1.0
+    assert said(by_hand(ground_view, doubt=1.0).evidence)[(0, 60)] < 0.0
 
 
 def test_what_may_go_on_beside_a_feature_is_not_drawn() -> None:
@@ -324,31 +335,30 @@ def test_the_resolution_is_refused_if_a_view_takes_too_many_cells() -> None:
         by_hand(ground_view, resolution=1e-3)
 
 
-def test_drop_offs_are_counted_once_per_cell() -> None:
-    places = [(1.0, 0.5), (1.01, 0.49), (3.0, -2.0)]
+def drop_offs(ground_view: GroundView, resolution: float = 0.5) -> list[Cell]:
+    """Cells that a view of nothing but drop-offs speaks of."""
+    evidence = by_hand(ground_view, resolution=resolution).evidence
+    assert evidence.height is not None
+    assert (evidence.height[evidence.z > 0] < 0).all()
+    return [(row, col) for row, col in evidence.cells().tolist()]
+
+
+def test_drop_offs_are_in_the_cells_below_them() -> None:
+    places = [(1.0, 0.5), (1.01, 0.49), (3.0, -2.0), (3.1, -2.1)]
     ground_view = flat_view(
         viewpoint=(0.01, 0.02), forward=(0.0, 1.0), drop_offs=places, drop_off_heights=-0.01
     )
     # Ahead is y of the map, left is -x.
-    cells = drop_off_cells(ground_view, ConfidenceGrid(resolution=0.5))
-    assert sorted(map(tuple, cells.tolist())) == [(2, -1), (6, 4)]
-
-
-def drop_offs(ground_view: GroundView, resolution: float = 0.5) -> list[Cell]:
-    cells = drop_off_cells(ground_view, ConfidenceGrid(resolution=resolution))
-    return [(row, col) for row, col in cells.tolist()]
+    assert sorted(drop_offs(ground_view)) == [(2, -1), (6, 4)]
 
 
 # A line of sight from 1 m up to a feature 1 m below the ground, 5.9 m ahead, enters the pit
 # at 2.95 m.
-PIT = flat_view(drop_offs=[(5.9, 0.1)], drop_off_heights=-1.0)
+PIT = flat_view(drop_offs=[(5.9, 0.1)] * 2, drop_off_heights=-1.0)
 
 
-def test_a_pit_is_counted_from_where_sight_enters_it() -> None:
+def test_ground_is_missing_from_where_sight_enters_a_pit() -> None:
     assert drop_offs(PIT) == [(0, col) for col in range(6, 12)]
-    # Seen again beside, each cell is still counted once.
-    twice = flat_view(drop_offs=[(5.9, 0.1), (5.9, 0.12)], drop_off_heights=-1.0)
-    assert drop_offs(twice) == drop_offs(PIT)
 
 
 def test_a_pit_lies_where_the_view_stands() -> None:
@@ -356,10 +366,55 @@ def test_a_pit_lies_where_the_view_stands() -> None:
     assert drop_offs(moved) == [(40 + row, 19) for row in range(6, 12)]
 
 
-def test_a_false_match_across_ground_that_was_seen_is_counted_where_it_is_alone() -> None:
-    assert drop_offs(PIT._replace(supports=np.array([(4.0, 0.0)]))) == [(0, 11)]
+def nonfree(ground_view: GroundView) -> dict[Cell, float]:
+    z = said(by_hand(ground_view, resolution=0.5).evidence)
+    return {cell: value for cell, value in z.items() if value > 0}
 
 
-def test_a_line_below_the_ground_for_long_is_counted_at_its_end_alone() -> None:
+def test_a_false_match_across_ground_that_was_seen_counts_where_it_is_alone() -> None:
+    ground_view = flat_view(
+        drop_offs=[(5.9, 0.1)] * 2, drop_off_heights=-1.0, supports=[(4.0, 0.0)]
+    )
+    assert nonfree(ground_view) == {(0, 11): 1.0}
+
+
+def test_a_line_below_the_ground_for_long_counts_at_its_end_alone() -> None:
     for end, count in ((5.9, 6), (6.1, 1)):  # 2.95 m and 3.05 m of it are below
-        assert len(drop_offs(flat_view(drop_offs=[(end, 0.1)], drop_off_heights=-1.0))) == count
+        assert len(drop_offs(flat_view(drop_offs=[(end, 0.1)] * 2, drop_off_heights=-1.0))) == count
+
+
+def test_a_drop_off_counts_as_much_as_it_is_sure() -> None:
+    ground_view = flat_view(drop_offs=[(1.2, 0.1), (1.3, 0.1)], drop_off_heights=[-0.01, -0.02])
+    for sureness in (0.25, 0.0):
+        unsure = ground_view._replace(drop_off_sureness=np.array([sureness, sureness]))
+        expected = {(0, 2): sureness} if sureness else {}
+        assert nonfree(unsure) == pytest.approx(expected)
+
+
+def test_a_lone_drop_off_says_nothing() -> None:
+    for apart, count in ((0.45, 2), (0.55, 0)):
+        places = [(1.2, 0.1), (1.2, 0.1 + apart)]
+        assert len(nonfree(flat_view(drop_offs=places, drop_off_heights=-0.01))) == count
+
+
+def test_the_top_of_what_was_seen_is_on_its_surface_alone() -> None:
+    low, high = (6.0, -1.0), (6.0, 1.0)
+    parts = by_hand(flat_view([low, high], [(0, 1)], heights=[0.4, 0.8], covariance=0.04))
+    z, height = parts.evidence.z, parts.evidence.height
+    assert height is not None
+    on_surface = z == z.max()
+    np.testing.assert_allclose(height[on_surface], 0.8, rtol=1e-6)
+    around = (z > 0) & ~on_surface
+    assert around.sum() > 10
+    assert np.isinf(height[around]).all()
+
+
+def test_sight_is_as_low_over_a_cell_as_the_line_to_the_ground_behind_it() -> None:
+    # From 1 m up to the ground 8 m ahead, and over the nearest 4 m to a second feature.
+    parts = by_hand(flat_view(supports=[(8.0, 0.0), (4.0, 0.0)]))
+    evidence = parts.evidence
+    assert evidence.height is not None
+    for x, sight in ((7.9375, 0.0078), (4.5625, 0.4297), (3.4375, 0.1406), (2.0625, 0.484)):
+        row, col = np.floor(np.array([0.01, x]) / RESOLUTION).astype(np.int64) - evidence.lower
+        assert evidence.z[row, col] < 0
+        assert evidence.height[row, col] == pytest.approx(sight, abs=1 / 64 + 1e-3)

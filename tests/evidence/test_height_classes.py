@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from groundmap import View
+from groundmap import GroundPlane, StereoRig, View
 from groundmap.arrays import Bools, Floats
 from groundmap.errors import NoGroundPlaneError
 from groundmap.evidence.ground_plane.height_classes import GroundView, flatten
@@ -306,6 +306,14 @@ def test_a_segment_below_the_ground_counts_by_its_middle() -> None:
     np.testing.assert_allclose(ground_view.drop_off_heights, [-0.7])
 
 
+def test_a_drop_off_is_as_sure_as_it_is_deep() -> None:
+    # At 5 m, 0.15 m + 0.02 * 5 m is a hollow; another step deeper it is sure.
+    for depth, sureness in ((0.2, 0.0), (0.25, 0.0), (0.31, 0.4), (0.4, 1.0), (2.0, 1.0)):
+        ground_view = flatten(level_view(points=[(5.0, 0.0, -depth)]), OPTIONS)
+        np.testing.assert_allclose(ground_view.drop_off_sureness, [sureness], atol=1e-6)
+        assert ground_view.dropped == {"below_ground": 1}
+
+
 @pytest.mark.parametrize(("cx", "border"), [(640.0, 640.0 / 700.0), (0.0, np.inf), (-3.0, np.inf)])
 def test_the_images_borders_are_those_of_the_rig(cx: float, border: float) -> None:
     view = level_view(points=[(5.0, 0.0, 0.5)])
@@ -320,3 +328,14 @@ def test_a_view_without_features_is_empty() -> None:
         len(part) for part in (ground_view.points, ground_view.supports, ground_view.drop_offs)
     ] == [0, 0, 0]
     assert ground_view.used == ground_view.dropped.total() == 0
+
+
+def test_the_base_is_where_the_pose_is() -> None:
+    # The camera sits 0.5 m ahead of the base and 0.2 m left of it, and looks ahead.
+    mount = np.array([[0, 0, 1, 0.5], [-1, 0, 0, 0.2], [0, -1, 0, 1.0], [0, 0, 0, 1.0]])
+    rig = StereoRig(fx=700.0, fy=700.0, cx=640.0, cy=360.0, baseline=0.12, T_base_camera=mount)
+    turned = np.array([[0, -1.0, 0, 3], [1, 0, 0, 4], [0, 0, 1, 0], [0, 0, 0, 1]])
+    view = View(T_map_base=turned, rig=rig).with_plane(GroundPlane.below_camera(rig, 1.0))
+    ground_view = flatten(view, OPTIONS)
+    np.testing.assert_allclose(ground_view.base, [(-0.5, -0.2)], atol=1e-12)
+    np.testing.assert_allclose(in_map(ground_view, ground_view.base), [(3.0, 4.0)], atol=1e-12)

@@ -20,7 +20,7 @@ from groundmap.evidence.ground_plane.surfaces import SurfaceKind, Surfaces, find
 from groundmap.evidence.ground_plane.visibility import NO_SURFACE, SightFan, visible_freespace
 from groundmap.evidence.triangulation import triangulate
 from groundmap.settings import MapperSettings
-from oracles import counted_against, farthest, peak_memory, places_without_ground
+from oracles import counted_against, farthest, peak_memory, places_without_ground, usual_gap
 from oracles import gap_chords as all_chords
 from oracles import support_chords as single_chords
 from strategies import Cloud, flat_view, rngs, rooms
@@ -395,7 +395,7 @@ def test_a_ground_feature_vouches_for_what_both_images_see(
     options = MapperSettings(sight_gap=0.0)
     supports = rng.uniform((0.4, -8.0), (9.0, 8.0), size=(20, 2))
     ground_view = flat_view(supports=supports, border=border, baseline=baseline)
-    found = support_chords(ground_view, options)[:20]  # no gap lies between lines of sight
+    found = support_chords(ground_view, options).chords[:20]  # no gap lies between lines of sight
     expected = single_chords(ground_view, options.support_width, options.support_angle)
     np.testing.assert_allclose(found, expected, atol=1e-9)
     for place, chord in zip(supports, found, strict=True):
@@ -449,8 +449,10 @@ def test_lines_to_low_obstacles_count_as_far_as_surely_before_them(
     bearings = np.arctan2(lines[kept, 1], lines[kept, 0])
     ts = rng.uniform(-1.5, 1.5, size=300)
     np.testing.assert_allclose(
-        farthest(support_chords(ground_view, options), ts),
-        farthest(all_chords(bearings, ranges[kept], 0.8), ts),
+        farthest(support_chords(ground_view, options).chords, ts),
+        farthest(
+            all_chords(bearings, ranges[kept], usual_gap(bearings, ranges[kept], 1e-9, 0.8)), ts
+        ),
         rtol=1e-9,
     )
 
@@ -542,7 +544,7 @@ def test_ground_is_missing_where_lines_of_sight_run_below_its_level(
         supports=rng.uniform((1.0, -5.0), (12.0, 5.0), size=(rng.integers(0, 40), 2)),
         camera_height=float(rng.uniform(0.5, 2.0)),
     )
-    found = missing_ground(ground_view, step)
+    found, _ = missing_ground(ground_view, step)
     expected = np.array(places_without_ground(ground_view, step)).reshape(-1, 2)
     np.testing.assert_allclose(found, expected, atol=1e-9)
 
@@ -555,7 +557,7 @@ def test_where_the_ground_is_missing_sight_is_below_it_and_not_beyond_the_featur
     height = -float(rng.uniform(0.1, 0.6))
     place = rng.uniform((1.0, -2.0), (5.0, 2.0))
     ground_view = flat_view(drop_offs=[place], drop_off_heights=height)
-    share = missing_ground(ground_view, 0.1) @ place / (place @ place)
+    share = missing_ground(ground_view, 0.1)[0] @ place / (place @ place)
     sight_height = 1.0 + share * (height - 1.0)
     assert ((sight_height < 0.0) & (sight_height > height)).all()
     assert np.diff(share).max(initial=0.0) * np.hypot(*place) <= 0.1 + 1e-9
@@ -592,4 +594,4 @@ def test_ground_beside_a_line_below_it_tells_of_a_false_match(
     ground: tuple[float, float], missing: bool
 ) -> None:
     ground_view = flat_view(drop_offs=[(5.0, 0.0)], supports=[ground])
-    assert len(missing_ground(ground_view, 0.1)) == (25 if missing else 0)
+    assert len(missing_ground(ground_view, 0.1)[0]) == (25 if missing else 0)

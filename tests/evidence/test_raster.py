@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from groundmap.arrays import Bools, Floats
-from groundmap.evidence.ground_plane.kernels.raster import draw_surfaces, fill_star
+from groundmap.evidence.ground_plane.kernels.raster import draw_surfaces, fill_star, lowest_sight
 from oracles import (
     cells_crossed,
     cells_in_disc,
@@ -49,6 +49,7 @@ def drawn(
     corners = ends[[0, 1, 1, 0]] if outline is None else outline
     draw_surfaces(
         z,
+        np.zeros(SHAPE, dtype=np.float32),
         ends[None],
         ends[None],
         corners[None],
@@ -56,6 +57,7 @@ def drawn(
         np.array([disc]),
         np.array([on_surface]),
         np.array([around]),
+        np.array([1.0]),
     )
     found: Bools = z > 0
     return found
@@ -293,15 +295,53 @@ def test_the_surer_surface_wins_in_any_order(rng: np.random.Generator) -> None:
     ends = rng.uniform((0.0, 0.0), (32.0, 24.0), size=(count, 2, 2))
     outlines = ends[:, [0, 1, 1, 0]] + np.array([(0, 0), (0, 0), (0, 3), (0, 3)])
     on_surface, around = rng.uniform(0.5, 1.0, size=count), rng.uniform(0.1, 0.5, size=count)
+    on_surface[1], tops = on_surface[0], rng.uniform(0.2, 2.0, size=count)
     ground_view = np.zeros((count, 2)), np.zeros(count)
 
     def drawing(order: list[int]) -> Floats:
         z = np.full(SHAPE, -1.0, dtype=np.float32)
-        picked = (outlines[order], ground_view[0], ground_view[1], on_surface[order], around[order])
-        draw_surfaces(z, ends[order], ends[order], *picked)
-        return z.astype(np.float64)
+        height = np.zeros(SHAPE, dtype=np.float32)
+        picked = (
+            outlines[order],
+            ground_view[0],
+            ground_view[1],
+            on_surface[order],
+            around[order],
+            tops[order],
+        )
+        draw_surfaces(z, height, ends[order], ends[order], *picked)
+        return np.stack([z, height]).astype(np.float64)
 
     forth = drawing(list(range(count)))
     np.testing.assert_array_equal(forth, drawing(list(range(count))[::-1]))
-    singly = np.max([drawing([row]) for row in range(count)], axis=0)
-    np.testing.assert_array_equal(forth, singly)
+    singly = np.array([drawing([row]) for row in range(count)])
+    np.testing.assert_array_equal(forth[0], singly[:, 0].max(axis=0))
+    # The surest surface of a cell gives its top, the highest of equally sure ones.
+    surest = singly[:, 0] == forth[0]
+    np.testing.assert_array_equal(forth[1], np.where(surest, singly[:, 1], -1.0).max(axis=0))
+
+
+@settings(max_examples=100)
+@given(rngs())
+def test_each_cell_has_the_height_of_the_lowest_line_of_sight_over_it(
+    rng: np.random.Generator,
+) -> None:
+    eye, count = 1.2, int(rng.integers(1, 8))
+    origin = rng.uniform((-2.0, -2.0), (34.0, 26.0))
+    bearing, width = rng.uniform(-np.pi, np.pi, size=count), rng.uniform(0.05, 1.2, size=count)
+    bearings = np.stack([bearing, bearing + width], axis=1)
+    radius = rng.uniform(1.0, 30.0, size=(count, 2))
+    ends = origin + radius[..., None] * np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
+    heights = rng.uniform(0.0, 0.8, size=(count, 2))
+    height = np.full(SHAPE, eye, dtype=np.float32)
+    lowest_sight(height, origin, eye, ends, heights)
+    expected = np.full(SHAPE, eye)
+    for (a, b), low in zip(ends, heights, strict=True):
+        sides = np.column_stack([a - origin, b - origin])
+        shares = (centres(SHAPE) - origin) @ np.linalg.inv(sides).T
+        inside = (shares >= 0).all(axis=-1) & (shares.sum(axis=-1) <= 1)
+        line = eye + shares @ (low - eye)
+        expected[inside] = np.minimum(expected, line)[inside]
+    # Rounded up to 1/64 m.
+    assert (height >= expected - 1e-6).all()
+    assert (height <= expected + 1 / 64 + 1e-6).all()

@@ -24,6 +24,7 @@ from oracles import (
     support_chords,
     symmetric_difference,
     triangles_of,
+    usual_gap,
     visible_region,
 )
 from strategies import Cloud, flat_view, rngs, rooms
@@ -67,7 +68,11 @@ def chords_of(ground_view: GroundView, options: MapperSettings) -> Floats:
     return np.concatenate(
         [
             support_chords(ground_view, options.support_width, options.support_angle),
-            gap_chords(bearings, ranges[low], options.sight_gap),
+            gap_chords(
+                bearings,
+                ranges[low],
+                usual_gap(bearings, ranges[low], options.support_width, options.sight_gap),
+            ),
         ]
     )
 

@@ -202,9 +202,10 @@ def _fuse(draw: Draw, on: ConfidenceGrid, _low: Any, _side: float, _folder: Path
     on.fuse(lower, draw.noted("z", array(draw, z, 0.6)))
 
 
-def _drop(draw: Draw, on: ConfidenceGrid, _low: Any, _side: float, _folder: Path) -> None:
-    cells = np.arange(2 * on.ndim).reshape(2, on.ndim)
-    on.add_drop_offs(draw.noted("cells", array(draw, cells, 0.7)))
+def _fuse_heights(draw: Draw, on: ConfidenceGrid, _low: Any, _side: float, _folder: Path) -> None:
+    z = np.linspace(-1, 1, 5**on.ndim, dtype=np.float32).reshape((5,) * on.ndim)
+    height = draw.noted("height", array(draw, np.abs(z) - np.float32(0.2), 0.5))
+    on.fuse(np.zeros(on.ndim, dtype=np.int64), z, height)
 
 
 def _tile(draw: Draw, on: ConfidenceGrid, _low: Any, _side: float, _folder: Path) -> None:
@@ -230,7 +231,7 @@ def _area(draw: Draw, on: ConfidenceGrid, _low: Any, _side: float, _folder: Path
 
 
 QUERIES = {
-    "area": _area, "at": _at, "drop": _drop, "export": _export, "fuse": _fuse, "merge": _merge,
+    "area": _area, "at": _at, "drop": _fuse_heights, "export": _export, "fuse": _fuse, "merge": _merge,
     "tile": _tile, "window": _window,
 }  # fmt: skip
 PATHS = (

@@ -29,14 +29,11 @@ SIDE = {2: 90, 3: 20}  # so large a block spans up to 3 tiles a side
 class Fuse(NamedTuple):
     lower: Ints
     z: Floats32
-
-
-class DropOffs(NamedTuple):
-    cells: Ints
+    height: Floats32 | None = None
 
 
 class Merge(NamedTuple):
-    views: list[Fuse | DropOffs]
+    views: list[Fuse]
 
 
 class Copy(NamedTuple):
@@ -47,12 +44,12 @@ class Reload(NamedTuple):
     pass
 
 
-Operation: TypeAlias = Fuse | DropOffs | Merge | Copy | Reload
+Operation: TypeAlias = Fuse | Merge | Copy | Reload
 
 
 @st.composite
 def blocks(draw: st.DrawFn, ndim: int) -> Fuse:
-    """Evidence with zeros of both signs, full marks, and anything between."""
+    """Evidence with zeros of both signs, full marks, and anything between; some with heights."""
     corner = st.integers(-REACH[ndim], REACH[ndim])
     lower = np.array([draw(corner) for _ in range(ndim)])
     shape = [draw(st.integers(1, SIDE[ndim])) for _ in range(ndim)]
@@ -62,24 +59,15 @@ def blocks(draw: st.DrawFn, ndim: int) -> Fuse:
     z[rng.random(shape) < draw(st.sampled_from([0.0, 0.5, 0.99, 1.0]))] = draw(
         st.sampled_from([0.0, -0.0])
     )
-    return Fuse(lower, z)
-
-
-@st.composite
-def drop_offs(draw: st.DrawFn, ndim: int) -> DropOffs:
-    cell = st.tuples(*[st.integers(-REACH[ndim], REACH[ndim])] * ndim)
-    cells = draw(st.lists(cell, max_size=5))
-    cells += cells[: draw(st.integers(0, 2))]
-    return DropOffs(np.array(cells, dtype=np.int64).reshape(-1, ndim))
+    if draw(st.booleans()):
+        return Fuse(lower, z)
+    height = rng.choice([-0.5, 0.0, 0.1, 0.15, 0.4, 0.6, 1.5, np.inf], shape).astype(np.float32)
+    return Fuse(lower, z, height)
 
 
 def operations(ndim: int) -> st.SearchStrategy[list[Operation]]:
-    views = st.one_of(blocks(ndim), drop_offs(ndim))
-    merges = st.builds(Merge, st.lists(views, max_size=3))
-    return st.lists(
-        st.one_of(blocks(ndim), drop_offs(ndim), merges, st.just(Copy()), st.just(Reload())),
-        max_size=8,
-    )
+    merges = st.builds(Merge, st.lists(blocks(ndim), max_size=3))
+    return st.lists(st.one_of(blocks(ndim), merges, st.just(Copy()), st.just(Reload())), max_size=8)
 
 
 def new_grid(ndim: int = 2) -> ConfidenceGrid:
@@ -90,13 +78,9 @@ def new_twin(ndim: int = 2) -> DenseGrid:
     return DenseGrid.empty(REACH[ndim] + SIDE[ndim] + 1, ndim)
 
 
-def see(grid: ConfidenceGrid, twin: DenseGrid, view: Fuse | DropOffs) -> None:
-    if isinstance(view, Fuse):
-        grid.fuse(view.lower, view.z)
-        twin.fuse(view.lower, view.z)
-    else:
-        grid.add_drop_offs(view.cells)
-        twin.add_drop_offs(view.cells)
+def see(grid: ConfidenceGrid, twin: DenseGrid, view: Fuse) -> None:
+    grid.fuse(*view)
+    twin.fuse(*view)
 
 
 def reloaded(grid: ConfidenceGrid) -> ConfidenceGrid:
@@ -107,13 +91,16 @@ def reloaded(grid: ConfidenceGrid) -> ConfidenceGrid:
 
 def contents(grid: ConfidenceGrid) -> dict[tuple[int, ...], tuple[bytes, ...]]:
     """Return all that the tiles hold, bit for bit."""
-    return {
-        index: (tile.confidence.tobytes(), tile.count.tobytes(), tile.drop_offs.tobytes())
-        for index, tile in grid.tiles()
+    held: dict[tuple[int, ...], tuple[bytes, ...]] = {
+        index: (tile.confidence.tobytes(), tile.count.tobytes()) for index, tile in grid.tiles()
     }
+    for layer in range(len(grid.heights)):
+        for index, tile in grid.layer_tiles(layer):
+            held[layer, *index] = (tile.confidence.tobytes(), tile.count.tobytes())
+    return held
 
 
-def built(views: list[Fuse | DropOffs], ndim: int) -> tuple[ConfidenceGrid, DenseGrid]:
+def built(views: list[Fuse], ndim: int) -> tuple[ConfidenceGrid, DenseGrid]:
     grid, twin = new_grid(ndim), new_twin(ndim)
     for view in views:
         see(grid, twin, view)
@@ -125,7 +112,7 @@ def run(todo: list[Operation], ndim: int) -> tuple[ConfidenceGrid, DenseGrid]:
     grid, twin = new_grid(ndim), new_twin(ndim)
     left_behind = []
     for operation in todo:
-        if isinstance(operation, Fuse | DropOffs):
+        if isinstance(operation, Fuse):
             see(grid, twin, operation)
             continue
         left_behind.append((grid, contents(grid)))
@@ -171,15 +158,14 @@ def test_a_window_holds_every_cell_that_its_box_touches(ndim: int, data: st.Data
     twin.assert_same(window, lower, upper)
 
 
-@given(st.lists(st.one_of(blocks(2), drop_offs(2)), max_size=4))
+@given(st.lists(blocks(2), max_size=4))
 @settings(max_examples=30)
 def test_the_window_without_bounds_is_the_box_around_the_touched_tiles(
-    views: list[Fuse | DropOffs],
+    views: list[Fuse],
 ) -> None:
     grid, twin = built(views, 2)
     window = grid.window()
-    assert window.count.sum() == twin.count.sum()
-    assert window.drop_offs.sum() == twin.drop_offs.sum()
+    assert window.count.sum() == twin.count[0].sum()
     touched = [index for index, _ in grid.tiles()]
     if touched:
         sides = np.ptp(np.array(touched), axis=0) + 1
@@ -208,9 +194,9 @@ def test_bounds_are_those_of_the_touched_tiles() -> None:
     npt.assert_array_equal(grid.bounds(), (1 + 64, 2 - 32, 1 + 96, 2))
 
 
-@given(blocks(2), blocks(2), drop_offs(2))
+@given(blocks(2), blocks(2), blocks(2))
 @settings(max_examples=30)
-def test_merging_is_commutative(a: Fuse, b: Fuse, c: DropOffs) -> None:
+def test_merging_is_commutative(a: Fuse, b: Fuse, c: Fuse) -> None:
     (one, _), (other, twin) = built([a], 2), built([b, c], 2)
     forth, back = one.merge(other), other.merge(one)
     twin.fuse(*a)
@@ -261,6 +247,7 @@ def test_trajectories_are_joined_by_merging() -> None:
         ),
         (ConfidenceGrid(resolution=1.0, origin=(0, 0, 0)), "one origin"),
         (ConfidenceGrid(resolution=1.0, rule=Capped(50)), "one rule"),
+        (ConfidenceGrid(resolution=1.0, heights=(0.2, 0.6)), "one heights"),
     ],
 )
 def test_maps_that_do_not_add_up_are_refused(other: ConfidenceGrid, message: str) -> None:
@@ -280,50 +267,96 @@ def test_memory_follows_what_was_seen_not_the_box_around_it() -> None:
     for cell in ((0, 0), (-100_000, 100_000)):  # 10 km apart in x and y
         grid.fuse(np.array(cell), np.full((1, 1), -1.0, np.float32))
     assert [index for index, _ in grid.tiles()] == [(-1563, 1562), (0, 0)]
-    assert grid.nbytes == 2 * 64 * 64 * 12
+    assert grid.nbytes == 2 * 64 * 64 * 8
     assert grid.count_at([(10_000.05, -9_999.95), (0.05, 0.05)]).tolist() == [1, 1]  # type: ignore[union-attr]
 
 
 def test_evidence_that_says_nothing_touches_no_tile() -> None:
     grid = new_grid()
     grid.fuse(np.array([-500, -500]), np.zeros((1000, 1000), dtype=np.float32))
-    grid.add_drop_offs(np.empty((0, 2), dtype=np.int64))
     assert grid.nbytes == 0
     grid.window((-50, -50, 50, 50))
     grid.confidence_at((1.0, 1.0))
     assert grid.nbytes == 0
 
 
-def test_a_drop_off_is_counted_once_per_view_and_says_nothing_of_confidence() -> None:
-    grid = ConfidenceGrid(resolution=1.0)
-    grid.add_drop_offs(np.array([[-1, 2], [-1, 2], [0, 0]]))
-    window = grid.window((0, -1, 3, 1))
-    npt.assert_array_equal(window.drop_offs, [[0, 0, 1], [1, 0, 0]])
-    assert not window.count.any()
-    assert not window.confidence.any()
+def test_heights_take_memory_only_where_they_are_known() -> None:
+    grid = ConfidenceGrid(resolution=0.1)
+    cell, z = np.zeros(2, dtype=np.int64), np.full((1, 1), -1.0, np.float32)
+    for height, layers in ((None, 0), (0.7, 0), (0.3, 1), (0.1, 2), (0.01, 3)):
+        grid.fuse(cell, z, None if height is None else np.full((1, 1), height, np.float32))
+        assert grid.nbytes == (1 + layers) * 64 * 64 * 8
+
+
+def one_cell(*evidence: tuple[float, float], rule: Average | None = None) -> float:
+    """Return the confidence of a cell that (z, height) was said of."""
+    grid = ConfidenceGrid(resolution=1.0, rule=rule)
+    for z, height in evidence:
+        grid.fuse(
+            np.array([0, 0]), np.full((1, 1), z, np.float32), np.full((1, 1), height, np.float32)
+        )
+    return float(grid.confidence_at((0.5, 0.5)))
+
+
+@given(
+    st.floats(-2.0, 2.0, width=32),
+    st.lists(st.floats(0.0, 3.0, width=32), max_size=300),
+    st.sampled_from([Average(), Capped(5)]),
+)
+def test_what_was_seen_is_never_outvoted_by_sight_above_its_top(
+    top: float, sights: list[float], rule: Average
+) -> None:
+    # A step of 0.15 m or less is no obstacle; sight above the last height refutes nothing.
+    over = [(-1.0, max(sight, top, 0.15)) for sight in sights]
+    assert one_cell((1.0, top), (1.0, top), *over, rule=rule) > 0.0
+
+
+@pytest.mark.parametrize("rule", [Average(), Capped(5)])
+@pytest.mark.parametrize("top", [-1.0, 0.2, 0.5, 1.0, 2.0])
+def test_what_was_taken_away_is_free_again_once_it_is_seen_low(top: float, rule: Average) -> None:
+    there, over, low = [(1.0, top)] * 5, [(-0.1, 2.0)] * 50, [(-1.0, 0.0)] * 10
+    assert one_cell(*there, *over, rule=rule) > 0.0
+    assert one_cell(*there, *over, *low, rule=rule) < 0.0
+
+
+def test_what_one_view_alone_saw_is_outvoted_by_sight_of_any_height() -> None:
+    assert one_cell((1.0, 0.3), *[(-1.0, 1.5)] * 2) < 0.0
+
+
+def test_ground_is_missing_until_it_is_touched() -> None:
+    hole = [(1.0, -1.0)] * 5
+    assert one_cell(*hole, *[(-1.0, 0.1)] * 50) > 0.0
+    assert one_cell(*hole, *[(-1.0, 0.02)] * 10) < 0.0
+
+
+def test_heights_of_another_shape_are_refused() -> None:
+    z = np.ones((2, 2), np.float32)
+    for height in (np.zeros((2, 3), np.float32), np.full((2, 2), np.nan, np.float32)):
+        with pytest.raises(InputError, match=r"^height: expected heights of shape \(2, 2\)"):
+            new_grid().fuse(np.array([0, 0]), z, height)
+
+
+@pytest.mark.parametrize("heights", [(0.0, 1.0), (0.6, 0.15), (0.1, np.nan)])
+def test_heights_that_do_not_ascend_are_refused(heights: tuple[float, ...]) -> None:
+    with pytest.raises(InputError, match=r"^heights: expected ascending numbers above 0"):
+        ConfidenceGrid(heights=heights)
 
 
 confidences = st.floats(-1.0, 1.0, width=32)
 
 
-@given(confidences, st.integers(0, 5), st.integers(0, 5), st.sampled_from([0.01, 0.2]))
-@example(0.0, 2, 0, 0.01)
-@example(float(np.float32(0.01)), 1, 0, 0.01)
-@example(-float(np.float32(0.01)), 1, 0, 0.01)
-@example(0.0, 0, 3, 0.01)
-def test_a_cell_has_one_of_four_states(
-    value: float, count: int, drops: int, epsilon: float
-) -> None:
+@given(confidences, st.integers(0, 5), st.sampled_from([0.01, 0.2]))
+@example(0.0, 2, 0.01)
+@example(float(np.float32(0.01)), 1, 0.01)
+@example(-float(np.float32(0.01)), 1, 0.01)
+def test_a_cell_has_one_of_four_states(value: float, count: int, epsilon: float) -> None:
     window = GridWindow(
         confidence=np.array([[value]], dtype=np.float32),
         count=np.array([[count]], dtype=np.uint32),
-        drop_offs=np.array([[drops]], dtype=np.uint32),
         origin=np.zeros(2),
         resolution=1.0,
     )
-    if drops >= 3:
-        expected = CellState.NONFREE
-    elif count == 0:
+    if count == 0:
         expected = CellState.UNKNOWN
     elif value <= -np.float32(epsilon):
         expected = CellState.FREE
@@ -347,8 +380,9 @@ def test_views_that_cancel_are_contested_not_unknown() -> None:
 def test_areas_of_the_states_add_up_to_the_touched_tiles() -> None:
     grid = ConfidenceGrid(resolution=0.5)
     grid.fuse(np.array([0, 0]), np.array([[-1, -1, -1, 0.5, 0.001]], dtype=np.float32))
-    for _ in range(3):
-        grid.add_drop_offs(np.array([[0, 0], [9, 9]]))
+    hole = np.ones((1, 1), np.float32), np.full((1, 1), -0.5, np.float32)
+    for corner in ((0, 0), (0, 0), (9, 9)):
+        grid.fuse(np.array(corner), *hole)
     areas = {state: grid.area(state) for state in CellState}
     cell = 0.25
     assert areas[CellState.FREE] == 2 * cell
@@ -357,23 +391,11 @@ def test_areas_of_the_states_add_up_to_the_touched_tiles() -> None:
     assert sum(areas.values()) == 64 * 64 * cell
 
 
-def test_counts_of_drop_offs_stop_at_their_largest() -> None:
-    most = 2**32 - 1
-    one, other = ConfidenceGrid(), ConfidenceGrid()
-    one.tile((0, 0)).drop_offs[0, :3] = most, most - 1, 7
-    other.tile((0, 0)).drop_offs[0, :3] = most, 5, 5
-    assert one.merge(other).tile((0, 0)).drop_offs[0, :3].tolist() == [most, most, 12]
-    for _ in range(2):
-        one.add_drop_offs(np.array([[0, 0], [0, 1], [0, 2]]))
-    assert one.tile((0, 0)).drop_offs[0, :3].tolist() == [most, most, 9]
-
-
 cells_2d = st.tuples(st.integers(-(10**6), 10**6), st.integers(-(10**6), 10**6))
 windows = st.builds(
     GridWindow,
     confidence=st.just(np.zeros((4, 6), np.float32)),
     count=st.just(np.zeros((4, 6), np.uint32)),
-    drop_offs=st.just(np.zeros((4, 6), np.uint32)),
     origin=st.tuples(st.floats(-1e4, 1e4), st.floats(-1e4, 1e4)).map(np.array),
     resolution=st.floats(0.01, 10.0),
 )
@@ -513,8 +535,9 @@ def a_map(ndim: int = 2) -> ConfidenceGrid:
     rng = np.random.default_rng(5)
     for _ in range(9):
         shape = (12,) * ndim
-        grid.fuse(rng.integers(-30, 30, ndim), rng.uniform(-1, 1, shape).astype(np.float32))
-    grid.add_drop_offs(rng.integers(-90, 90, (5, ndim)))
+        z, height = rng.uniform(-1, 1, shape), rng.uniform(-0.5, 1, shape)
+        lower = rng.integers(-30, 30, ndim)
+        grid.fuse(lower, z.astype(np.float32), height.astype(np.float32))
     grid.trajectory = rng.uniform(-9, 9, (4, 3))
     return grid
 
@@ -585,10 +608,14 @@ def with_array(name: str, change: Callable[[Any], Any]) -> Callable[[Arrays], ob
 
 
 TAMPERED: dict[str, Callable[[Arrays], object]] = {
-    **{f"without {name}": without(name) for name in ("tiles", "confidence", "count", "drop_offs")},
+    **{f"without {name}": without(name) for name in ("tiles", "confidence", "count")},
+    **{f"without {name}_1": without(f"{name}_1") for name in ("tiles", "confidence", "count")},
+    "heights that descend": header_with(heights=[0.6, 0.15]),
+    "no heights": header_with(heights=None),
+    "more heights than layers": header_with(heights=[0.1, 0.2, 0.3, 0.4]),
     "without trajectory": without("trajectory"),
     "of another format": header_with(format="zip"),
-    "of a newer version": header_with(version=2),
+    "of a newer version": header_with(version=3),
     "version in words": header_with(version="one"),
     "no resolution": header_with(resolution=None),
     "resolution 0": header_with(resolution=0),

@@ -26,7 +26,12 @@ def grid() -> ConfidenceGrid:
     for cell, confidence in (("free", -0.5), ("nonfree", 0.5), ("contested", 0.001)):
         tile.confidence[CELLS[cell]] = confidence
         tile.count[CELLS[cell]] = 2
-    tile.drop_offs[CELLS["drop_off"]] = 3
+    # Sight over the drop-off was free more often than it was seen.
+    where, size = np.array(CELLS["drop_off"]), (1, 1)
+    for _ in range(2):
+        made.fuse(where, np.ones(size, np.float32), np.full(size, -0.5, np.float32))
+    for _ in range(3):
+        made.fuse(where, -np.ones(size, np.float32), np.full(size, 0.3, np.float32))
     return made
 
 
@@ -108,13 +113,11 @@ def test_dense_arrays_are_the_window(tmp_path: Path, origin: tuple[float, ...]) 
     tile = grid.tile((0,) * len(origin))
     tile.confidence[...] = rng.uniform(-1, 1, tile.confidence.shape)
     tile.count[...] = rng.integers(0, 9, tile.count.shape)
-    tile.drop_offs[...] = rng.integers(0, 9, tile.count.shape)
     export(grid, tmp_path / "map.npz")
     with np.load(tmp_path / "map.npz", allow_pickle=False) as arrays:
-        assert set(arrays) == {"confidence", "count", "drop_offs", "resolution", "origin"}
+        assert set(arrays) == {"confidence", "count", "resolution", "origin"}
         npt.assert_array_equal(arrays["confidence"], tile.confidence)
         npt.assert_array_equal(arrays["count"], tile.count)
-        npt.assert_array_equal(arrays["drop_offs"], tile.drop_offs)
         assert arrays["resolution"] == 0.1524
         npt.assert_array_equal(arrays["origin"], origin)
 

@@ -117,7 +117,6 @@ def test_a_written_map_is_read_unchanged(
         tile = grid.tile(at)
         tile.confidence[...] = rng.uniform(-1.0, 1.0, tile.confidence.shape).round(1)
         tile.count[...] = rng.integers(0, 3, tile.count.shape)
-        tile.drop_offs[...] = rng.integers(0, 3, tile.count.shape)
     window = grid.window()
     with TemporaryDirectory() as folder:
         write_ros_map(grid, Path(folder) / "map.yaml")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from groundmap.arrays import Floats
@@ -12,16 +14,30 @@ from groundmap.evidence.ground_plane.kernels.lines import (
 from groundmap.evidence.uncertainty import MODELS
 from groundmap.settings import MapperSettings
 
+USUAL_GAPS = 0.8  # share of the gaps between lines of sight that are no wider than usual
+UNUSUAL = 4.0  # times the usual width: where features are dense, such a gap is empty for a reason
 
-def support_chords(ground_view: GroundView, settings: MapperSettings) -> Floats:
-    """Return the chords that freespace reaches to where no surface is, shape (k, 2, 2) [m, view].
+
+class Supports(NamedTuple):
+    """Chords that freespace reaches to where no surface is."""
+
+    chords: Floats  #: shape (k, 2, 2) [m, view], counter-clockwise
+    heights: Floats  #: shape (k, 2) [m], of the lines of sight above the ground at their ends
+
+
+def support_chords(ground_view: GroundView, settings: MapperSettings) -> Supports:
+    """Return the chords that freespace reaches to where no surface is.
 
     Each ground feature at range r vouches for the bearings within min(support_width / r,
     support_angle), out to r. Two lines of sight vouch for what is between them as far as both
     reach and no more than `sight_gap` lies between: nothing wider fits in unseen. Lines to
     obstacles count as far as before the obstacle, if they come down low enough.
     """
-    return np.concatenate([_single_chords(ground_view, settings), _gaps(ground_view, settings)])
+    single = _single_chords(ground_view, settings)
+    chords, heights = _gaps(ground_view, settings)
+    return Supports(
+        np.concatenate([single, chords]), np.concatenate([np.zeros((len(single), 2)), heights])
+    )
 
 
 def _single_chords(ground_view: GroundView, settings: MapperSettings) -> Floats:
@@ -51,15 +67,34 @@ def _borders(ground_view: GroundView, radius: Floats) -> tuple[Floats, Floats]:
     return np.full(len(radius), -border), border - blind
 
 
-def _gaps(ground_view: GroundView, settings: MapperSettings) -> Floats:
+def _gaps(ground_view: GroundView, settings: MapperSettings) -> tuple[Floats, Floats]:
     low = ground_view.heights <= settings.grant_height * ground_view.camera_height
     points = np.concatenate([ground_view.supports, ground_view.points[low]])
-    ranges = np.hypot(points[:, 0], points[:, 1])
+    full = np.hypot(points[:, 0], points[:, 1])
+    heights = np.concatenate([np.zeros(len(ground_view.supports)), ground_view.heights[low]])
+    ranges = full.copy()
     model = MODELS[settings.uncertainty]
     ranges[len(ground_view.supports) :] -= settings.spread_sigmas * model.sigma(
         ground_view.points[low], ground_view.covariance[low]
     )
+    share = ranges / np.where(full > 0, full, 1.0)
+    heights = ground_view.camera_height + (heights - ground_view.camera_height) * share
     bearings = np.arctan2(points[:, 1], points[:, 0])
     order = np.argsort(bearings, kind="stable")
     order = order[ranges[order] > settings.min_range]
-    return gap_chords(bearings[order], ranges[order], settings.sight_gap)
+    lines = (bearings[order], ranges[order], heights[order], ground_view.camera_height)
+    chords, _ = gap_chords(*lines, np.inf)
+    return gap_chords(*lines, widest_gap(chords, settings))
+
+
+def widest_gap(chords: Floats, settings: MapperSettings) -> float:
+    """Return which gap between lines of sight counts as seen [m].
+
+    Four times what the view's features usually leave between neighbouring lines of sight, whose
+    `chords` have the shape (k, 2, 2) [m, view].
+    """
+    if len(chords) == 0:
+        return settings.sight_gap
+    width = np.hypot(*(chords[:, 1] - chords[:, 0]).T)
+    usual = float(np.quantile(width, USUAL_GAPS))
+    return min(max(UNUSUAL * usual, settings.support_width), settings.sight_gap)

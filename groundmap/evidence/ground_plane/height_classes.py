@@ -20,11 +20,14 @@ from groundmap.view.camera_check import check_camera, check_plane
 from groundmap.view.ground_plane import GroundPlane
 from groundmap.view.view import Features, View, sigma_along
 
+HOLLOW = 0.02  # [1/m of range], how deep ground may lie below the plane and still be driven on
+
 
 class GroundView(NamedTuple):
     """The features of one view in its ground frame, by height class."""
 
     viewpoint: Floats  #: shape (2,) [m, map]
+    base: Floats  #: shape (k, 2) [m, view], where the base stands: 0 or 1 place
     forward: Floats  #: shape (2,), unit vector [map]: x of the frame ``view``
     camera_height: float  #: [m] above the ground plane
     border: float  #: tangent of the bearing of the left image's borders
@@ -38,6 +41,7 @@ class GroundView(NamedTuple):
     feature: Ints  #: shape (n + k,), which feature of the view each point and support is of
     drop_offs: Floats  #: shape (b, 2) [m, view], features below the ground
     drop_off_heights: Floats  #: shape (b,) [m], below 0
+    drop_off_sureness: Floats  #: shape (b,), 0 to 1, the deeper the surer
     used: int  #: features that are in any of the above
     dropped: Counter[str]  #: features that are not, by reason
 
@@ -109,6 +113,7 @@ def flatten(view: View, settings: MapperSettings, *, number: int | None = None) 
     ends = np.arange(n_points, n_points + len(obstacles[1].xy), dtype=np.int64)
     return GroundView(
         viewpoint=T_map_camera[:2, 3],
+        base=_in_view(view.T_map_base[:2, 3] - T_map_camera[:2, 3], forward)[None],
         forward=forward,
         camera_height=float(plane.height(view.rig.T_base_camera[:3, 3])),
         border=view.rig.cx / view.rig.fx if view.rig.cx > 0 else np.inf,
@@ -122,9 +127,17 @@ def flatten(view: View, settings: MapperSettings, *, number: int | None = None) 
         feature=np.concatenate([part.feature for part in (*obstacles, *grounds)]),
         drop_offs=np.concatenate([part.below[:, :2] for part in parts]),
         drop_off_heights=np.concatenate([part.below[:, 2] for part in parts]),
+        drop_off_sureness=np.concatenate([part.below[:, 3] for part in parts]),
         used=sum(part.used for part in parts),
         dropped=+dropped,
     )
+
+
+def _in_view(offset: Floats, forward: Floats) -> Floats:
+    """Turn a vector of the map, shape (2,) [m], into the frame ``view``."""
+    ahead = forward[0] * offset[0] + forward[1] * offset[1]
+    left = forward[0] * offset[1] - forward[1] * offset[0]
+    return np.array([ahead, left])
 
 
 def _measure(
@@ -162,7 +175,7 @@ def _measure(
 class _Classes(NamedTuple):
     obstacles: _Heights
     ground: _Heights
-    below: Floats  # shape (b, 3): place and height
+    below: Floats  # shape (b, 4): place, height and sureness
     used: int
 
 
@@ -185,7 +198,7 @@ def _point_classes(points: _Heights, settings: MapperSettings, dropped: Counter[
     return _Classes(
         _pick(points, obstacle),
         _pick(points, ground),
-        np.column_stack([points.xy[below], points.height[below]]),
+        _drop_offs(_pick(points, below), settings),
         int(obstacle.sum() + ground.sum()),
     )
 
@@ -215,9 +228,20 @@ def _segment_classes(
         _sample_segments(
             _pick(segments, ground.any), np.stack(ground, axis=1)[ground.any], settings
         ),
-        np.column_stack([segments.xy[below].mean(axis=1), segments.height[below].mean(axis=1)]),
+        _drop_offs(_each(_pick(segments, below), lambda ends: ends.mean(axis=1)), settings),
         int(used.sum()),
     )
+
+
+def _drop_offs(below: _Heights, settings: MapperSettings) -> Floats:
+    """Return place, height and sureness of features below the ground, shape (b, 4).
+
+    A plane is off the farther the larger the range, and a hollow of a step's depth is driven
+    through: sureness begins where both are exceeded, and is 1 another step deeper.
+    """
+    allowed = np.maximum(below.tolerance, settings.step_height + HOLLOW * below.radius)
+    sureness = np.clip((-below.height - allowed) / settings.step_height, 0.0, 1.0)
+    return np.column_stack([below.xy, below.height, sureness])
 
 
 def _sample_segments(segments: _Heights, spans: Floats, settings: MapperSettings) -> _Heights:

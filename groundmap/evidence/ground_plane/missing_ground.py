@@ -14,11 +14,12 @@ DEEPEST_SIGHT = 3.0  # [m], along the ground: longer lines below it are mostly f
 BESIDE = 0.15  # [m], a ground feature this near to a line of sight is beside it
 
 
-def missing_ground(ground_view: GroundView, step: float) -> Floats:
+def missing_ground(ground_view: GroundView, step: float) -> tuple[Floats, Ints]:
     """Return places, `step` [m] apart, that lines of sight to features below the ground pass over.
 
-    From where they go below the ground's level up to the feature, shape (n, 2) [m, view]. A line
-    that ground features lie beside there is that of a false match, and is left out.
+    From where they go below the ground's level up to the feature, shape (n, 2) [m, view], and
+    which of the `drop_offs` each belongs to, shape (n,). A line that ground features lie beside
+    there is that of a false match, and is left out.
     """
     range_at_end = np.hypot(ground_view.drop_offs[:, 0], ground_view.drop_offs[:, 1])
     entry = ground_view.camera_height / (ground_view.camera_height - ground_view.drop_off_heights)
@@ -29,8 +30,7 @@ def missing_ground(ground_view: GroundView, step: float) -> Floats:
     line = np.repeat(rows, counts)
     number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     share = entry[line] + (1.0 - entry[line]) * (number + 0.5) / np.repeat(counts, counts)
-    places: Floats = ground_view.drop_offs[line] * share[:, None]
-    return places
+    return ground_view.drop_offs[line] * share[:, None], line
 
 
 def _beside_ground(ground_view: GroundView, rows: Ints, entry: Floats) -> Bools:

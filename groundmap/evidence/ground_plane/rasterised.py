@@ -4,20 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from groundmap.arrays import FARTHEST_CELL, Floats, Ints
+from groundmap.arrays import FARTHEST_CELL, Bools, Floats, Floats32, Ints
 from groundmap.errors import InputError
 from groundmap.evidence.evidence import Evidence
 from groundmap.evidence.ground_plane.height_classes import GroundView
-from groundmap.evidence.ground_plane.kernels.raster import draw_surfaces, fill_star
+from groundmap.evidence.ground_plane.kernels.raster import (
+    draw_surfaces,
+    fill_star,
+    lowest_sight,
+    roll_over,
+)
 from groundmap.evidence.ground_plane.missing_ground import missing_ground
 from groundmap.evidence.ground_plane.surfaces import SurfaceKind, Surfaces
-from groundmap.evidence.ground_plane.visibility import SightFan
+from groundmap.evidence.ground_plane.visibility import NO_SURFACE, SightFan
 from groundmap.evidence.uncertainty import MODELS
 from groundmap.grid.grid import ConfidenceGrid
 from groundmap.printable import format_value
 from groundmap.settings import MapperSettings
 
 MARGIN = 1  # [cells] around what is drawn, so that rounding can't push a border cell outside
+LOW_SIGHT = 4.0  # [step_height]: sight that passes higher says the least about the ground
+LEAST_SURE = 0.25  # -z under high sight
+CONFIRMED = 0.5  # [m], a lone feature below the ground is most likely a false match
 MOST_CELLS = 2**26  # a block of 256 MiB: more is a resolution in the wrong unit
 
 
@@ -30,8 +38,11 @@ def evidence_of(
 ) -> Evidence:
     """Draw surfaces and freespace of a view into cells.
 
-    Freespace is -1 in the fan; surfaces are above 0, spread by the uncertainty model. Where both
-    fall into a cell the surface wins: letting the last ray win erases walls.
+    Freespace is below 0 in the fan: -1 where sight touches the ground, and the nearer to 0 the
+    higher the lowest line of sight passes. Surfaces are above 0, spread by the uncertainty model.
+    Where the base stands the ground is free, as wide as the narrowest footprint.
+    Where both fall into a cell the surface wins: letting the last ray win erases walls. Where
+    ground is missing, a cell is non-free, too.
 
     Raises
     ------
@@ -45,7 +56,18 @@ def evidence_of(
     outlines = to_cells(model.outline(surfaces.cores, surfaces.reach))
     caps = model.caps(surfaces.reach) / grid.resolution
     discs = surfaces.discs / grid.resolution
-    corners = [free, outlines, ends, *_around(cores, caps), *_around(ends, discs[:, None])]
+    wheels, half_width = (
+        to_cells(ground_view.base),
+        0.5 * settings.narrowest_footprint / grid.resolution,
+    )
+    corners = [
+        *_around(wheels, np.full((1, 1), half_width)),
+        free,
+        outlines,
+        ends,
+        *_around(cores, caps),
+        *_around(ends, discs[:, None]),
+    ]
     drawn = np.concatenate([origin[None], *(array.reshape(-1, 2) for array in corners)])
     if not (np.abs(drawn) < FARTHEST_CELL).all():
         raise InputError(
@@ -64,6 +86,7 @@ def evidence_of(
             hint="Give a coarser resolution, or a smaller max_range [m].",
         )
     z = np.zeros(shape[::-1], dtype=np.float32)
+    height = np.full(z.shape, ground_view.camera_height, dtype=np.float32)
     on_surface, around = model.evidence(surfaces.reach, grid.resolution)
     belief = fan.contradictions.belief
     drawn = surfaces.kind != SurfaceKind.DOUBTFUL
@@ -71,8 +94,14 @@ def evidence_of(
         odd = np.zeros(z.shape, dtype=np.uint8)
         free = free - lower
         fill_star(z, odd, origin - lower, free[:, 0], free[:, 1], fan.joined)
+        _draw_sight(height, lower, ground_view, fan, to_cells)
+        surest = 1.0 - height / (LOW_SIGHT * settings.step_height)
+        z *= np.clip(surest, LEAST_SURE, 1.0, dtype=np.float32)
+    for wheel in wheels - lower:
+        roll_over(z, height, wheel, half_width)
     draw_surfaces(
         z,
+        height,
         ends[drawn] - lower,
         cores[drawn] - lower,
         outlines[drawn] - lower,
@@ -80,21 +109,74 @@ def evidence_of(
         discs[drawn],
         (on_surface * belief)[drawn],
         (around * belief)[drawn],
+        surfaces.tops.max(axis=1)[drawn],
     )
-    return Evidence(lower[::-1].astype(np.int64), z)
+    evidence = Evidence(lower[::-1].astype(np.int64), z, height)
+    return with_drop_offs(evidence, ground_view, grid)
 
 
-def drop_off_cells(ground_view: GroundView, grid: ConfidenceGrid) -> Ints:
-    """Return the cells ``[row, col]`` where the ground is missing, each once.
+def _draw_sight(
+    height: Floats32, lower: Floats, ground_view: GroundView, fan: SightFan, to_cells: _CellsOf
+) -> None:
+    """Lower the cells' heights to the lines of sight that end on the ground or on a surface."""
+    walls = fan.surface != NO_SURFACE
+    ends = np.concatenate([fan.supports.chords, fan.ends[walls]])
+    heights = np.concatenate([fan.supports.heights, fan.bottoms[walls]])
+    viewpoint = to_cells(np.zeros((1, 2)))[0] - lower
+    lowest_sight(height, viewpoint, ground_view.camera_height, to_cells(ends) - lower, heights)
 
-    Those under features below the ground, and those that their lines of sight pass over between
-    the ground's level and the feature: had there been ground, it would have been in the way.
+
+def with_drop_offs(evidence: Evidence, ground_view: GroundView, grid: ConfidenceGrid) -> Evidence:
+    """Return the evidence of a view with what its features below the ground say.
+
+    Ground is missing under such features, and where their lines of sight pass between the
+    ground's level and the feature: had there been ground, it would have been in the way. There, z
+    is raised to how sure they are.
     """
-    places = np.concatenate(
-        [ground_view.drop_offs, missing_ground(ground_view, 0.5 * grid.resolution)]
+    deep = (ground_view.drop_off_sureness > 0) & ~_alone(ground_view.drop_offs)
+    if not deep.any():
+        return evidence
+    ground_view = ground_view._replace(
+        drop_offs=ground_view.drop_offs[deep],
+        drop_off_heights=ground_view.drop_off_heights[deep],
+        drop_off_sureness=ground_view.drop_off_sureness[deep],
     )
-    cells = np.floor(_CellsOf(ground_view, grid)(places)).astype(np.int64)
-    return np.unique(cells[:, ::-1], axis=0)
+    passed, line = missing_ground(ground_view, 0.5 * grid.resolution)
+    number = np.concatenate([np.arange(len(ground_view.drop_offs)), line])
+    places = np.concatenate([ground_view.drop_offs, passed])
+    cells = np.floor(_CellsOf(ground_view, grid)(places)).astype(np.int64)[:, ::-1]
+    lower, z, height = _grown(evidence, cells.min(axis=0), cells.max(axis=0) + 1)
+    # From the least sure to the surest, and of equally sure ones the least deep last.
+    order = np.lexsort(
+        [ground_view.drop_off_heights[number], ground_view.drop_off_sureness[number]]
+    )
+    for row, col, value, depth in zip(
+        *(cells[order] - lower).T,
+        ground_view.drop_off_sureness[number][order].astype(np.float32),
+        ground_view.drop_off_heights[number][order],
+        strict=True,
+    ):
+        if value >= z[row, col]:
+            z[row, col] = value
+            if height is not None:
+                height[row, col] = depth
+    return Evidence(lower, z, height)
+
+
+def _alone(places: Floats) -> Bools:
+    """Return which places, shape (n, 2) [m], have no other within `CONFIRMED`."""
+    apart = np.hypot(*np.moveaxis(places[:, None] - places[None], -1, 0))
+    alone: Bools = (apart <= CONFIRMED).sum(axis=1) == 1
+    return alone
+
+
+def _grown(evidence: Evidence, lower: Ints, upper: Ints) -> Evidence:
+    """Return the evidence as a block that holds the cells from `lower` up to `upper`, too."""
+    before = np.maximum(evidence.lower - lower, 0)
+    after = np.maximum(upper - evidence.lower - evidence.z.shape, 0)
+    margins = list(zip(before.tolist(), after.tolist(), strict=True))
+    height = None if evidence.height is None else np.pad(evidence.height, margins)
+    return Evidence(evidence.lower - before, np.pad(evidence.z, margins), height)
 
 
 class _CellsOf:

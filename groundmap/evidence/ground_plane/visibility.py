@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from groundmap.arrays import Bools, Floats, Ints
-from groundmap.evidence.ground_plane.free_support import support_chords
+from groundmap.evidence.ground_plane.free_support import Supports, support_chords
 from groundmap.evidence.ground_plane.height_classes import GroundView
 from groundmap.evidence.ground_plane.kernels.envelope import join_envelopes, upper_envelope
 from groundmap.evidence.ground_plane.see_through import Contradictions, contradictions
@@ -24,8 +24,10 @@ class SightFan(NamedTuple):
     ends: Floats  #: shape (k, 2, 2) [m, view], where sight ends
     surface: Ints  #: shape (k,), row of the surfaces; -1 where ground support ends it
     free: Floats  #: shape (k, 2, 2) [m, view], where freespace ends: a reach before the surface
+    bottoms: Floats  #: shape (k, 2) [m], how low sight comes at the ends on surfaces; else 0
     joined: Bools  #: shape (k,), the next triangle (after the last the first) begins where it ends
     contradictions: Contradictions  #: surfaces that features are seen through
+    supports: Supports  #: chords that sight reaches to at ground level
 
     @property
     def area(self) -> float:
@@ -68,7 +70,8 @@ def visible_freespace(
     hiding = np.flatnonzero(doubts.hiding)
     walls = _by_bearing(surfaces.ends[hiding])
     walls = walls._replace(row=hiding[walls.row])
-    grounds = _by_bearing(support_chords(ground_view, settings))
+    supports = support_chords(ground_view, settings)
+    grounds = _by_bearing(supports.chords)
     nearest = upper_envelope(walls.t0, walls.t1, walls.a, walls.b)
     farthest = upper_envelope(grounds.t0, grounds.t1, -grounds.a, -grounds.b)
     lowest = surfaces.bottoms[walls.row].min(axis=1)
@@ -86,13 +89,16 @@ def visible_freespace(
     following = np.roll(low, -1)
     if len(following):
         following[-1] += 2 * np.pi
+    free, bottoms = _before_surfaces(ends, surface, surfaces)
     return SightFan(
         bearings=np.stack([low, high], axis=1),
         ends=ends,
         surface=surface,
-        free=_before_surfaces(ends, surface, surfaces),
+        free=free,
+        bottoms=bottoms,
         joined=np.isclose(following, high, rtol=0.0, atol=1e-15),
         contradictions=doubts,
+        supports=supports,
     )
 
 
@@ -134,19 +140,20 @@ def _by_bearing(ends: Floats) -> _Edges:
     )
 
 
-def _before_surfaces(ends: Floats, surface: Ints, surfaces: Surfaces) -> Floats:
-    """Pull the ends of sight towards the viewpoint by the surfaces' reach."""
-    free = ends.copy()
+def _before_surfaces(ends: Floats, surface: Ints, surfaces: Surfaces) -> tuple[Floats, Floats]:
+    """Pull the ends of sight towards the viewpoint by the surfaces' reach; their bottoms, too."""
+    free, bottoms = ends.copy(), np.zeros(ends.shape[:2])
     rows = np.flatnonzero(surface != NO_SURFACE)
     first, last = surfaces.ends[surface[rows], 0], surfaces.ends[surface[rows], 1]
     edge = last - first
     length = (edge**2).sum(axis=1)[:, None]
     t = np.clip(((ends[rows] - first[:, None]) * edge[:, None]).sum(axis=2) / length, 0.0, 1.0)
-    reach = surfaces.reach[surface[rows]]
+    reach, low = surfaces.reach[surface[rows]], surfaces.bottoms[surface[rows]]
     before = (1 - t) * reach[:, :1] + t * reach[:, 1:]
+    bottoms[rows] = (1 - t) * low[:, :1] + t * low[:, 1:]
     radius = np.hypot(ends[rows, :, 0], ends[rows, :, 1])
     free[rows] *= (np.maximum(radius - before, 0.0) / radius)[:, :, None]
-    return free
+    return free, bottoms
 
 
 def _cross(a: Floats, b: Floats) -> Floats:

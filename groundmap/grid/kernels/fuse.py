@@ -31,3 +31,14 @@ def merge_average(confidence: Floats32, count: Counts, other: Floats32, others: 
             total = ours * confidence[i] + theirs * other[i]
             confidence[i] = np.float32(total / (ours + theirs))
             count[i] += min(others[i], MOST - count[i])
+
+
+@njit(cache=True, nogil=True)
+def keep_low(z: Floats32, height: Floats32, sight: float, top: float, low: Floats32) -> None:
+    """Copy to `low` the free evidence of sight below `sight` and the non-free of tops below `top`.
+
+    All arrays have the shape (n,); heights are in metres.
+    """
+    for i in range(z.size):
+        if z[i] != 0.0 and height[i] < (sight if z[i] < 0.0 else top):
+            low[i] = z[i]

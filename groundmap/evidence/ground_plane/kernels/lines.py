@@ -106,15 +106,20 @@ def features_beside(
 
 
 @njit(cache=True, nogil=True)
-def gap_chords(bearings: Floats, ranges: Floats, widest: float) -> Floats:
+def gap_chords(
+    bearings: Floats, ranges: Floats, heights: Floats, eye: float, widest: float
+) -> tuple[Floats, Floats]:
     """Return chords between lines of sight that nothing `widest` wide fits between.
 
     Two lines are neighbours at a range if no line between them reaches as far. Their chord lies
-    where both still reach and are `widest` apart at most. Returns shape (k, 2, 2), counter-
-    clockwise.
+    where both still reach and are `widest` apart at most. Lines lead from `eye` above the ground
+    to `heights` at their ranges.
+
+    Returns the chords, shape (k, 2, 2), counter-clockwise, and how high sight is at their ends,
+    shape (k, 2).
     """
     count = len(bearings)
-    chords = np.empty((2 * count, 2, 2))
+    chords, ends = np.empty((2 * count, 2, 2)), np.empty((2 * count, 2))
     stack = np.empty(count, np.int64)  # lines that something to the left may still neighbour
     size, top = 0, 0
     for j in range(count):
@@ -123,14 +128,14 @@ def gap_chords(bearings: Floats, ranges: Floats, widest: float) -> Floats:
             gap = bearings[j] - bearings[i]
             if NARROWEST_GAP < gap < WIDEST_GAP:
                 radius = min(ranges[i], ranges[j], 0.5 * widest / np.sin(0.5 * gap))
-                chords[size, 0, 0] = radius * np.cos(bearings[i])
-                chords[size, 0, 1] = radius * np.sin(bearings[i])
-                chords[size, 1, 0] = radius * np.cos(bearings[j])
-                chords[size, 1, 1] = radius * np.sin(bearings[j])
+                for side, line in ((0, i), (1, j)):
+                    chords[size, side, 0] = radius * np.cos(bearings[line])
+                    chords[size, side, 1] = radius * np.sin(bearings[line])
+                    ends[size, side] = eye + (heights[line] - eye) * (radius / ranges[line])
                 size += 1
             if ranges[i] > ranges[j]:
                 break
             top -= 1
         stack[top] = j
         top += 1
-    return chords[:size]
+    return chords[:size], ends[:size]

@@ -12,6 +12,9 @@ from numba import njit
 from groundmap.arrays import Bools, Bytes, Floats, Floats32
 
 FREE = np.float32(-1.0)
+NO_TOP = np.float32(np.inf)  # where a surface may be, but was not seen
+EDGE = 1e-9  # [cells]: a centre this near to a triangle is in it
+STEPS = 64.0  # [1/m], heights are rounded up to: where a map lies doesn't change them
 
 
 @njit(cache=True, nogil=True)
@@ -64,6 +67,7 @@ def _first_centre(coordinate: float) -> int:
 @njit(cache=True, nogil=True)
 def draw_surfaces(
     z: Floats32,
+    height: Floats32,
     ends: Floats,
     cores: Floats,
     outlines: Floats,
@@ -71,30 +75,34 @@ def draw_surfaces(
     discs: Floats,
     on_surface: Floats,
     around: Floats,
+    tops: Floats,
 ) -> None:
     """Raise z to what each surface says: on it, and in the spread around it.
 
-    Non-free evidence wins over free, and the surer over the less sure: z is a maximum.
+    Non-free evidence wins over free, and the surer over the less sure: z is a maximum, and
+    `height` the top of the surface that it comes from (of equally sure ones, the highest).
     """
     for i in range(len(ends)):
-        spread = np.float32(around[i])
-        _fill_quadrangle(z, outlines[i], spread)
-        _draw_line(z, outlines[i, 0], outlines[i, 3], spread)
-        _draw_line(z, outlines[i, 1], outlines[i, 2], spread)
+        spread, top = np.float32(around[i]), np.float32(tops[i])
+        _fill_quadrangle(z, height, outlines[i], spread, NO_TOP)
+        _draw_line(z, height, outlines[i, 0], outlines[i, 3], spread, NO_TOP)
+        _draw_line(z, height, outlines[i, 1], outlines[i, 2], spread, NO_TOP)
         for side in range(2):
             if caps[i, side] > 0.0:
-                _fill_disc(z, cores[i, side], caps[i, side], spread)
+                _fill_disc(z, height, cores[i, side], caps[i, side], spread, NO_TOP)
         surface = np.float32(on_surface[i])
         if discs[i] > 0.0:
             middle = 0.5 * (ends[i, 0] + ends[i, 1])
-            _fill_disc(z, middle, discs[i], surface)
-            _draw_line(z, middle, middle, surface)
+            _fill_disc(z, height, middle, discs[i], surface, top)
+            _draw_line(z, height, middle, middle, surface, top)
         else:
-            _draw_line(z, ends[i, 0], ends[i, 1], surface)
+            _draw_line(z, height, ends[i, 0], ends[i, 1], surface, top)
 
 
 @njit(cache=True, nogil=True)
-def _fill_quadrangle(z: Floats32, corners: Floats, value: np.float32) -> None:
+def _fill_quadrangle(
+    z: Floats32, height: Floats32, corners: Floats, value: np.float32, top: np.float32
+) -> None:
     lowest, highest = corners[:, 1].min(), corners[:, 1].max()
     crossings = np.empty(4)
     for row in range(max(_first_centre(lowest), 0), min(_first_centre(highest), z.shape[0])):
@@ -112,11 +120,13 @@ def _fill_quadrangle(z: Floats32, corners: Floats, value: np.float32) -> None:
             left = max(_first_centre(crossings[pair]), 0)
             right = min(_first_centre(crossings[pair + 1]), z.shape[1])
             for col in range(left, right):
-                z[row, col] = max(z[row, col], value)
+                _raise(z, height, row, col, value, top)
 
 
 @njit(cache=True, nogil=True)
-def _fill_disc(z: Floats32, centre: Floats, radius: float, value: np.float32) -> None:
+def _fill_disc(
+    z: Floats32, height: Floats32, centre: Floats, radius: float, value: np.float32, top: np.float32
+) -> None:
     for row in range(
         max(_first_centre(centre[1] - radius), 0),
         min(_first_centre(centre[1] + radius) + 1, z.shape[0]),
@@ -128,11 +138,13 @@ def _fill_disc(z: Floats32, centre: Floats, radius: float, value: np.float32) ->
         ):
             dx = col + 0.5 - centre[0]
             if dx * dx + dy * dy <= radius * radius:
-                z[row, col] = max(z[row, col], value)
+                _raise(z, height, row, col, value, top)
 
 
 @njit(cache=True, nogil=True)
-def _draw_line(z: Floats32, p: Floats, q: Floats, value: np.float32) -> None:
+def _draw_line(
+    z: Floats32, height: Floats32, p: Floats, q: Floats, value: np.float32, top: np.float32
+) -> None:
     """Visit the cells from p to q in order (Amanatides and Woo 1987)."""
     col, row = int(np.floor(p[0])), int(np.floor(p[1]))
     last_col, last_row = int(np.floor(q[0])), int(np.floor(q[1]))
@@ -146,10 +158,92 @@ def _draw_line(z: Floats32, p: Floats, q: Floats, value: np.float32) -> None:
     # The number of borders is known beforehand, so rounding can't make the walk miss its end.
     for _ in range(abs(last_col - col) + abs(last_row - row) + 1):
         if 0 <= row < z.shape[0] and 0 <= col < z.shape[1]:
-            z[row, col] = max(z[row, col], value)
+            _raise(z, height, row, col, value, top)
         if col != last_col and (next_x < next_y or row == last_row):
             col += step_x
             next_x += each_x
         else:
             row += step_y
             next_y += each_y
+
+
+@njit(cache=True, nogil=True)
+def _raise(
+    z: Floats32, height: Floats32, row: int, col: int, value: np.float32, top: np.float32
+) -> None:
+    """Raise a cell to the surer value, and to the higher top among equally sure ones."""
+    if value > z[row, col]:
+        z[row, col], height[row, col] = value, top
+    elif value == z[row, col]:
+        height[row, col] = max(height[row, col], top)
+
+
+@njit(cache=True, nogil=True)
+def lowest_sight(
+    height: Floats32, origin: Floats, eye: float, ends: Floats, end_heights: Floats
+) -> None:
+    """Lower each cell to the lowest line of sight over its centre.
+
+    Parameters
+    ----------
+    height : ndarray of float32 [m]
+        Is lowered where lines pass below it, to multiples of 1/64 m; not below 0.
+    origin : ndarray, shape (2,) [cells]
+        Where the camera is, `eye` [m] above the ground.
+    ends : ndarray, shape (k, 2, 2) [cells]
+        Lines of sight fill the triangles (camera, end, end), counter-clockwise ones.
+    end_heights : ndarray, shape (k, 2) [m]
+        How high they are at the ends.
+    """
+    for i in range(len(ends)):
+        ax, ay = ends[i, 0, 0] - origin[0], ends[i, 0, 1] - origin[1]
+        bx, by = ends[i, 1, 0] - origin[0], ends[i, 1, 1] - origin[1]
+        area = ax * by - ay * bx
+        if area <= 0.0:
+            continue
+        fall_a, fall_b = end_heights[i, 0] - eye, end_heights[i, 1] - eye
+        first = max(_first_centre(origin[1] + min(0.0, ay, by) - EDGE), 0)
+        last = min(_first_centre(origin[1] + max(0.0, ay, by) + EDGE), height.shape[0])
+        for row in range(first, last):
+            y = row + 0.5 - origin[1]
+            left, right = _span(y, ax, ay, bx, by)
+            begin = max(_first_centre(origin[0] + left - EDGE), 0)
+            end = min(_first_centre(origin[0] + right + EDGE), height.shape[1])
+            for col in range(begin, end):
+                x = col + 0.5 - origin[0]
+                # The line's height is linear over the triangle: shares of both ends, in one order
+                # whichever way the map is turned.
+                sight = eye + (x * by - y * bx) / area * fall_a + (ax * y - ay * x) / area * fall_b
+                low = np.float32(np.ceil(max(sight, 0.0) * STEPS) / STEPS)
+                height[row, col] = min(height[row, col], low)
+
+
+@njit(cache=True, nogil=True)
+def roll_over(z: Floats32, height: Floats32, centre: Floats, radius: float) -> None:
+    """Set the cells whose centres lie within a disc to -1, at height 0: wheels touch them."""
+    for row in range(
+        max(_first_centre(centre[1] - radius), 0),
+        min(_first_centre(centre[1] + radius) + 1, z.shape[0]),
+    ):
+        for col in range(
+            max(_first_centre(centre[0] - radius), 0),
+            min(_first_centre(centre[0] + radius) + 1, z.shape[1]),
+        ):
+            dx, dy = col + 0.5 - centre[0], row + 0.5 - centre[1]
+            if dx * dx + dy * dy <= radius * radius:
+                z[row, col], height[row, col] = FREE, 0.0
+
+
+@njit(cache=True, nogil=True)
+def _span(y: float, ax: float, ay: float, bx: float, by: float) -> tuple[float, float]:
+    """Return where the triangle (0, 0), a, b begins and ends in a row."""
+    left, right = np.inf, -np.inf
+    for px, py, qx, qy in ((0.0, 0.0, ax, ay), (ax, ay, bx, by), (bx, by, 0.0, 0.0)):
+        if min(py, qy) - EDGE <= y <= max(py, qy) + EDGE:
+            if abs(qy - py) <= EDGE:
+                x0, x1 = px, qx
+            else:
+                x0 = px + (qx - px) * min(max((y - py) / (qy - py), 0.0), 1.0)
+                x1 = x0
+            left, right = min(left, x0, x1), max(right, x0, x1)
+    return left, right
