@@ -231,8 +231,8 @@ def _area(draw: Draw, on: ConfidenceGrid, _low: Any, _side: float, _folder: Path
 
 
 QUERIES = {
-    "area": _area, "at": _at, "drop": _fuse_heights, "export": _export, "fuse": _fuse, "merge": _merge,
-    "tile": _tile, "window": _window,
+    "area": _area, "at": _at, "export": _export, "fuse": _fuse, "fuse heights": _fuse_heights,
+    "merge": _merge, "tile": _tile, "window": _window,
 }  # fmt: skip
 PATHS = (
     "", ".", "nothing", "a\x00b", "\ud800", "\u202e.map", "x" * 300, "x" * 5000, "/dev/null", "/",

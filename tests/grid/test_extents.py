@@ -36,7 +36,7 @@ def map_file(tmp_path: Path) -> Path:
 
 NAMES_IT = (
     r"^map: expected a box of \d+ cells at most around all tiles, got 1\.00006e\+06 x 128 cells "
-    r"\(500032 x 64 m, 1\.54 GB\)\. 1 of 7 tiles lies far from the rest, the one at "
+    r"\(500032 x 64 m, 1\.02 GB\)\. 1 of 7 tiles lies far from the rest, the one at "
     r"\(500016, 16\) m, 499904 m away: is a pose wrong there\? Give the bounds of a part "
     r"\(bounds=\.\.\., --bounds\), without them 0\.0,0\.0,96\.0,64\.0\.$"
 )
@@ -70,7 +70,7 @@ def test_a_large_map_without_gaps_blames_no_tile() -> None:
 
 
 def test_bounds_of_too_many_cells_say_what_memory_they_would_take() -> None:
-    expected = r"^bounds: expected a box of 268435456 cells .* got 200000 x 2000 .* 4\.8 GB\)"
+    expected = r"^bounds: expected a box of 268435456 cells .* got 200000 x 2000 .* 3\.2 GB\)"
     with pytest.raises(InputError, match=expected):
         with_far_tile().window((0, 0, 1e5, 1e3))
     with pytest.raises(InputError, match=r"^bounds: expected a box of 33554432 cells at most"):
