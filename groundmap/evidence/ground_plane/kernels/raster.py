@@ -14,7 +14,7 @@ from groundmap.arrays import Bools, Bytes, Floats, Floats32
 FREE = np.float32(-1.0)
 NO_TOP = np.float32(np.inf)  # where a surface may be, but was not seen
 EDGE = 1e-9  # [cells]: a centre this near to a triangle is in it
-STEPS = 64.0  # [1/m], heights are rounded up to: where a map lies doesn't change them
+STEPS = np.float32(64.0)  # [1/m], heights are rounded up to: where a map lies doesn't change them
 
 
 @njit(cache=True, nogil=True)
@@ -187,7 +187,7 @@ def lowest_sight(
     Parameters
     ----------
     height : ndarray of float32 [m]
-        Is lowered where lines pass below it, to multiples of 1/64 m; not below 0.
+        Is lowered where lines pass below it, not below 0; then rounded up to multiples of 1/64 m.
     origin : ndarray, shape (2,) [cells]
         Where the camera is, `eye` [m] above the ground.
     ends : ndarray, shape (k, 2, 2) [cells]
@@ -202,6 +202,10 @@ def lowest_sight(
         if area <= 0.0:
             continue
         fall_a, fall_b = end_heights[i, 0] - eye, end_heights[i, 1] - eye
+        # The line's height is linear over the triangle. Both products are added in one step, so
+        # that a quarter turn of the map only swaps them.
+        slope_x = (by * fall_a - ay * fall_b) / area
+        slope_y = (ax * fall_b - bx * fall_a) / area
         first = max(_first_centre(origin[1] + min(0.0, ay, by) - EDGE), 0)
         last = min(_first_centre(origin[1] + max(0.0, ay, by) + EDGE), height.shape[0])
         for row in range(first, last):
@@ -211,11 +215,13 @@ def lowest_sight(
             end = min(_first_centre(origin[0] + right + EDGE), height.shape[1])
             for col in range(begin, end):
                 x = col + 0.5 - origin[0]
-                # The line's height is linear over the triangle: shares of both ends, in one order
-                # whichever way the map is turned.
-                sight = eye + (x * by - y * bx) / area * fall_a + (ax * y - ay * x) / area * fall_b
-                low = np.float32(np.ceil(max(sight, 0.0) * STEPS) / STEPS)
-                height[row, col] = min(height[row, col], low)
+                low = np.float32(eye + (slope_x * x + slope_y * y))
+                if low < height[row, col]:
+                    height[row, col] = low
+    for row in range(height.shape[0]):
+        for col in range(height.shape[1]):
+            low = max(height[row, col], np.float32(0.0))
+            height[row, col] = np.ceil(low * STEPS) / STEPS
 
 
 @njit(cache=True, nogil=True)
