@@ -216,8 +216,7 @@ def lowest_sight(
             for col in range(begin, end):
                 x = col + 0.5 - origin[0]
                 low = np.float32(eye + (slope_x * x + slope_y * y))
-                if low < height[row, col]:
-                    height[row, col] = low
+                height[row, col] = min(height[row, col], low)
     for row in range(height.shape[0]):
         for col in range(height.shape[1]):
             low = max(height[row, col], np.float32(0.0))
