@@ -27,7 +27,7 @@ class GroundView(NamedTuple):
     """The features of one view in its ground frame, by height class."""
 
     viewpoint: Floats  #: shape (2,) [m, map]
-    base: Floats  #: shape (k, 2) [m, view], where the base stands: 0 or 1 place
+    base: Floats  #: shape (k, 2) [m, view], place of the base; none in a view without features
     forward: Floats  #: shape (2,), unit vector [map]: x of the frame ``view``
     camera_height: float  #: [m] above the ground plane
     border: float  #: tangent of the bearing of the left image's borders
@@ -111,9 +111,10 @@ def flatten(view: View, settings: MapperSettings, *, number: int | None = None) 
     obstacles, grounds = [part.obstacles for part in parts], [part.ground for part in parts]
     n_points = len(obstacles[0].xy)
     ends = np.arange(n_points, n_points + len(obstacles[1].xy), dtype=np.int64)
+    used = sum(part.used for part in parts)
     return GroundView(
         viewpoint=T_map_camera[:2, 3],
-        base=_in_view(view.T_map_base[:2, 3] - T_map_camera[:2, 3], forward)[None],
+        base=_in_view(view.T_map_base[:2, 3] - T_map_camera[:2, 3], forward)[None][: min(used, 1)],
         forward=forward,
         camera_height=float(plane.height(view.rig.T_base_camera[:3, 3])),
         border=view.rig.cx / view.rig.fx if view.rig.cx > 0 else np.inf,
@@ -128,7 +129,7 @@ def flatten(view: View, settings: MapperSettings, *, number: int | None = None) 
         drop_offs=np.concatenate([part.below[:, :2] for part in parts]),
         drop_off_heights=np.concatenate([part.below[:, 2] for part in parts]),
         drop_off_sureness=np.concatenate([part.below[:, 3] for part in parts]),
-        used=sum(part.used for part in parts),
+        used=used,
         dropped=+dropped,
     )
 
