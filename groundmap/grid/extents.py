@@ -41,7 +41,7 @@ def cells_of_box(bounds: npt.ArrayLike, origin: Floats, resolution: float) -> tu
 
 
 def check_size(lower: Ints, upper: Ints, most_cells: int, resolution: float) -> None:
-    """Check the number of cells in a box before arrays are allocated.
+    """Check the number of cells in a box before allocation.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def check_size(lower: Ints, upper: Ints, most_cells: int, resolution: float) -> 
 
 
 def check_whole(tiles: Tiles, most_cells: int, origin: Floats, resolution: float) -> None:
-    """Check the number of cells in the bounding box of all tiles before arrays are allocated.
+    """Check the number of cells in the box around the observed tiles before allocation.
 
     Parameters
     ----------
@@ -101,7 +101,8 @@ def check_whole(tiles: Tiles, most_cells: int, origin: Floats, resolution: float
             outwards = np.concatenate([np.floor(10 * main[0]), np.ceil(10 * main[1])]) / 10
             advice += ", without them " + ",".join(f"{value:.1f}" for value in outwards)
     size = _size(lower, upper, resolution)
-    raise InputError("map", f"{_expected(most_cells)} around all tiles", size, hint=f"{advice}.")
+    expected = f"{_expected(most_cells)} around the observed tiles"
+    raise InputError("map", expected, size, hint=f"{advice}.")
 
 
 def _count(lower: Ints, upper: Ints) -> int:
