@@ -9,28 +9,22 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import (
-    Counts,
-    Floats,
-    Floats32,
-    Ints,
-    as_cell,
-    as_floats,
-    check_finite,
-    is_number,
+from groundmap.arrays import Counts, Floats, Floats32, Ints, as_cell
+from groundmap.errors import InputError
+from groundmap.grid.arguments import (
+    as_evidence,
+    as_origin,
+    as_resolution,
+    check_frame,
+    check_merge,
 )
-from groundmap.errors import FileFormatError, InputError, MergeError
-from groundmap.files.archive import read_archive, write_archive
 from groundmap.grid.extents import cells_of_box, check_size, check_whole
-from groundmap.grid.fusion import Average, UpdateRule, rule_from
+from groundmap.grid.fusion import Average, UpdateRule
+from groundmap.grid.grid_files import GridContent, read_grid, write_grid
 from groundmap.grid.height_layers import SIGHT_HEIGHTS, HeightLayers, as_heights
-from groundmap.grid.old_versions import upgrade
-from groundmap.grid.tiles import LAYERS, TILE_SHAPES, Index, Tile, Tiles
+from groundmap.grid.tiles import Index, Tile, Tiles
 from groundmap.grid.window import CellState, GridWindow, cells_of
-from groundmap.printable import format_value, is_plain
 
-FORMAT, VERSION = "groundmap-grid", 2
-SMALLEST, LARGEST, FARTHEST = 1e-9, 1e9, 1e100  # [m] cells and origin; areas are then numbers
 MOST_CELLS = 2**28  # of a dense window: 2 GiB
 
 
@@ -73,24 +67,9 @@ class ConfidenceGrid:
         rule: UpdateRule | None = None,
         heights: tuple[float, ...] = SIGHT_HEIGHTS,
     ) -> None:
-        if not isinstance(frame, str):
-            raise InputError("frame", "a name", format_value(frame))
-        if not is_plain(frame):
-            raise InputError(
-                "frame", "a name without NUL and unpaired surrogates", format_value(frame)
-            )
-        if not (is_number(resolution) and resolution > 0):
-            raise InputError("resolution", "a number above 0 [m]", format_value(resolution))
-        if not SMALLEST <= resolution <= LARGEST:
-            raise InputError("resolution", f"{SMALLEST:g} to {LARGEST:g} m", str(resolution))
-        self.origin = as_floats("origin", origin, (None,))
-        if len(self.origin) not in TILE_SHAPES:
-            raise InputError("origin", "2 or 3 numbers [m]", f"{len(self.origin)}")
-        self.resolution = float(resolution)
-        check_finite("origin", self.origin)
-        if (np.abs(self.origin) > FARTHEST).any():
-            raise InputError("origin", f"numbers up to {FARTHEST:g} m", str(self.origin.tolist()))
+        check_frame(frame)
         self.frame, self.rule = frame, rule or Average()
+        self.resolution, self.origin = as_resolution(resolution), as_origin(origin)
         self._tiles = Tiles(len(origin))
         self._layers = HeightLayers(len(origin), heights)
         #: Base poses of the views, shape (n, 3): x, y [m], yaw [rad], in the map frame.
@@ -237,25 +216,13 @@ class ConfidenceGrid:
             another shape.
         """
         lower = as_cell("lower", lower, self.ndim)
-        z = self._as_evidence(z)
-        if not (np.abs(z) <= 1.0).all():
-            raise InputError("z", "evidence in [-1, 1]", "NaN or numbers beyond")
+        z = as_evidence(z, self.ndim)
         if height is not None:
             height = as_heights(height, np.shape(z))
         for tile, block in self._tiles.cut(lower, z):
             self.rule.update(tile.confidence, tile.count, block)
         if height is not None:
             self._layers.fuse(lower, z, height, self.rule)
-
-    def _as_evidence(self, z: npt.ArrayLike) -> npt.NDArray[Any]:
-        expected = f"evidence in {self.ndim} dimensions"
-        try:
-            block = np.asarray(z)
-        except ValueError as error:  # rows of different lengths
-            raise InputError("z", expected, format_value(z)) from error
-        if block.ndim != self.ndim or block.dtype.kind not in "biuf":
-            raise InputError("z", expected, f"{block.dtype} of shape {block.shape}")
-        return block
 
     def merge(self, other: ConfidenceGrid) -> ConfidenceGrid:
         """Return a new grid with the views of both, equal to a map of all views.
@@ -274,7 +241,7 @@ class ConfidenceGrid:
         >>> a.merge(b).confidence_at((0.5, 0.5))
         -0.25
         """
-        self._check_merge(other)
+        check_merge(self._settings(), other._settings())
         merged = self.copy()
         for index, theirs in other.tiles():
             ours = merged.tile(index)
@@ -283,31 +250,11 @@ class ConfidenceGrid:
         merged.trajectory = np.concatenate([self.trajectory, other.trajectory])
         return merged
 
-    def _check_merge(self, other: ConfidenceGrid) -> None:
-        for name in ("resolution", "frame", "rule", "origin", "heights"):
-            ours, theirs = getattr(self, name), getattr(other, name)
-            if not np.array_equal(ours, theirs):
-                raise MergeError(f"maps add up only with one {name}: expected {ours}, got {theirs}")
-        if not self.rule.mergeable:
-            raise MergeError(
-                f"the rule {self.rule.name!r} depends on the order of the views, so its maps "
-                "don't add up. Map with fusion='average', or integrate all views in one mapper."
-            )
-
     def copy(self) -> ConfidenceGrid:
         """Return an independent copy of the grid."""
-        twin = ConfidenceGrid(
-            resolution=self.resolution,
-            origin=self.origin.tolist(),
-            frame=self.frame,
-            rule=self.rule,
-            heights=self.heights,
-        )
+        twin = ConfidenceGrid(**self._settings())
+        twin._tiles.copy_from(self._tiles)
         twin._layers.copy_from(self._layers)
-        for index, tile in self.tiles():
-            mine = twin.tile(index)
-            for layer in LAYERS:
-                getattr(mine, layer)[...] = getattr(tile, layer)
         twin.trajectory = self.trajectory.copy()
         return twin
 
@@ -319,21 +266,8 @@ class ConfidenceGrid:
         OSError
             The folder does not exist or is not writable.
         """
-        header = {
-            "format": FORMAT,
-            "version": VERSION,
-            "resolution": self.resolution,
-            "origin": self.origin.tolist(),
-            "frame": self.frame,
-            "rule": self.rule.to_dict(),
-            "heights": self.heights,
-        }
-        arrays = {
-            **self._tiles.to_arrays(),
-            **self._layers.to_arrays(),
-            "trajectory": self.trajectory,
-        }
-        write_archive(path, header, arrays)
+        content = GridContent(self._settings(), self._tiles, self._layers, self.trajectory)
+        write_grid(path, content)
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> ConfidenceGrid:
@@ -344,20 +278,18 @@ class ConfidenceGrid:
         FileFormatError
             The file is not a map file, of a newer version, truncated or altered.
         """
-        header, arrays = read_archive(path, FORMAT, VERSION)
-        try:
-            header, arrays = upgrade(header, arrays)
-            grid = cls(
-                resolution=header["resolution"],
-                origin=header["origin"],
-                frame=header["frame"],
-                rule=rule_from(header["rule"]),
-                heights=tuple(header["heights"]),
-            )
-            grid._tiles = Tiles.from_arrays(grid.ndim, arrays)
-            grid._layers = HeightLayers.from_arrays(grid.ndim, grid.heights, arrays)
-            grid.trajectory = as_floats("trajectory", arrays["trajectory"], (None, 3))
-            check_finite("trajectory", grid.trajectory)
-        except (KeyError, TypeError, ValueError) as error:
-            raise FileFormatError(path, "a complete map file", f"{error}") from error
+        content = read_grid(path)
+        grid = cls(**content.settings)
+        grid._tiles, grid._layers = content.tiles, content.layers
+        grid.trajectory = content.trajectory
         return grid
+
+    def _settings(self) -> dict[str, Any]:
+        """Return the arguments of the constructor."""
+        return {
+            "resolution": self.resolution,
+            "origin": self.origin.copy(),
+            "frame": self.frame,
+            "rule": self.rule,
+            "heights": self.heights,
+        }

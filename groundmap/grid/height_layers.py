@@ -134,9 +134,7 @@ class HeightLayers:
     def copy_from(self, other: HeightLayers) -> None:
         """Copy the content of layers of the same heights."""
         for ours, theirs in zip(self._layers, other._layers, strict=True):
-            for index, tile in theirs.items():
-                mine = ours.touch(index)
-                mine.confidence[...], mine.count[...] = tile.confidence, tile.count
+            ours.copy_from(theirs)
 
     def tiles(self, layer: int) -> Iterator[tuple[Index, Tile]]:
         """Iterate over (index, tile) of a layer, 0 for the lowest, in the order of the indices."""

@@ -182,6 +182,12 @@ class Tiles:
             kept = kept[~fewer]
         return kept, np.concatenate(away)
 
+    def copy_from(self, other: Tiles) -> None:
+        """Copy the values of all tiles of another grid."""
+        for index, tile in other.items():
+            mine = self.touch(index)
+            mine.confidence[...], mine.count[...] = tile.confidence, tile.count
+
     def to_arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return one array per layer with all tiles stacked, and their indices as ``tiles``."""
         indices = np.array([index for index, _ in self.items()], dtype=np.int64)
