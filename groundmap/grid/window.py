@@ -1,4 +1,4 @@
-"""A dense piece of a grid, the four states of its cells, and where cells lie."""
+"""Dense windows of a grid, the four states of cells, and cell coordinates."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ EPSILON = 0.01  # |confidence| below this is contested
 class CellState(IntEnum):
     """The four states of a cell."""
 
-    UNKNOWN = 0  #: never said anything about
+    UNKNOWN = 0  #: never observed
     FREE = 1  #: confidence <= -epsilon
     NONFREE = 2  #: confidence >= epsilon
-    CONTESTED = 3  #: in between: the views contradict each other
+    CONTESTED = 3  #: in between: views contradict each other
 
 
 @dataclass(frozen=True, eq=False)
 class GridWindow:
-    """A dense piece of a grid; arrays are indexed ``[row, col]`` (``[layer, row, col]`` in 3-D).
+    """A dense window of a grid; arrays are indexed ``[row, col]`` (``[layer, row, col]`` in 3-D).
 
     Attributes
     ----------
     confidence : ndarray of float32
-        Freespace below zero, non-freespace above: the surest of what is known at any height.
+        Below zero for freespace, above zero for non-freespace; the highest of all layers.
     count : ndarray of uint32
-        Views that spoke of the cell.
+        Number of views that observed the cell.
     origin : ndarray, shape (d,) [m, map]
         Outer corner of cell (0, 0), x first.
     resolution : float [m]
@@ -72,7 +72,7 @@ class GridWindow:
         return states
 
     def world_to_cell(self, xy: npt.ArrayLike) -> Ints:
-        """Return the cells ``[row, col]`` of map positions (x, y) [m], outside ones included."""
+        """Return the cells ``[row, col]`` of map positions (x, y) [m], inside or outside."""
         return cells_of(xy, self.origin, self.resolution)
 
     def cell_to_world(self, cells: npt.ArrayLike) -> Floats:
@@ -80,16 +80,22 @@ class GridWindow:
         return centres_of(cells, self.origin, self.resolution)
 
     def contains(self, cells: Ints) -> Bools:
-        """Return which cells lie inside."""
+        """Return which cells lie inside the window."""
         within = (cells >= 0) & (cells < np.array(self.count.shape))
         inside: Bools = np.logical_and.reduce(within, axis=-1)
         return inside
 
 
 def cells_of(xy: npt.ArrayLike, origin: Floats, resolution: float) -> Ints:
-    """Return the cells of positions: axes reversed, borders belong to the cell they open.
+    """Return the cells ``[row, col]`` of positions; a lower border belongs to its cell.
 
-    Positions beyond `FARTHEST_CELL`, where no grid has anything, get that cell.
+    Cells beyond `FARTHEST_CELL`, which no grid contains, are clipped to it.
+
+    Parameters
+    ----------
+    xy : array_like, shape (n, d) or (d,) [m, map]
+    origin : ndarray, shape (d,) [m, map]
+    resolution : float [m]
     """
     positions = as_positions("xy", xy, len(origin))
     return scaled_cells(np.floor, positions, origin, resolution)
@@ -98,7 +104,16 @@ def cells_of(xy: npt.ArrayLike, origin: Floats, resolution: float) -> Ints:
 def scaled_cells(
     rounded: Callable[[Floats], Floats], positions: Floats, origin: Floats, resolution: float
 ) -> Ints:
-    """Return positions, shape (n, d), in cells ``[row, col]``, rounded up or down."""
+    """Return positions in cells ``[row, col]``, rounded up or down.
+
+    Parameters
+    ----------
+    rounded : callable
+        `numpy.floor` or `numpy.ceil`.
+    positions : ndarray, shape (n, d) [m, map]
+    origin : ndarray, shape (d,) [m, map]
+    resolution : float [m]
+    """
     with np.errstate(over="ignore"):
         scaled = (positions - origin) / resolution
     cells = np.clip(rounded(scaled), -FARTHEST_CELL, FARTHEST_CELL)
@@ -106,6 +121,13 @@ def scaled_cells(
 
 
 def centres_of(cells: npt.ArrayLike, origin: Floats, resolution: float) -> Floats:
-    """Return the centres of cells."""
+    """Return the centres of cells, shape (n, d) [m, map].
+
+    Parameters
+    ----------
+    cells : array_like, shape (n, d) or (d,)
+    origin : ndarray, shape (d,) [m, map]
+    resolution : float [m]
+    """
     index = as_cells("cells", cells, len(origin))
     return origin + (index[:, ::-1] + 0.5) * resolution
