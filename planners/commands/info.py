@@ -9,13 +9,11 @@ import typer
 
 from groundmap import CellState
 from groundmap.io import load_map
-from planners.commands.console import JsonOption, emit
+from planners.commands.console import MAP_HELP, JsonOption, emit
 
 
 def info_command(
-    map_file: Annotated[
-        Path, typer.Argument(metavar="MAP", help="A map: .npz, .yaml (map_server), .map, .3dmap.")
-    ],
+    map_file: Annotated[Path, typer.Argument(metavar="MAP", help=MAP_HELP)],
     as_json: JsonOption = False,
 ) -> None:
     """Summarise a map file: areas [m²], bounds [m], update rule, poses."""
