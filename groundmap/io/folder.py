@@ -53,6 +53,7 @@ class FolderLog(ViewLog):
     looks_for = f"{RIG}, or one of {', '.join(TABLES.values())} and {ARCHIVE}"
 
     def __init__(self, path: Path, *, poses: Path | None = None) -> None:
+        path = path.parent if path.is_file() else path
         super().__init__(path, poses=poses)
         self.rig, world = read_rig(path / RIG)
         own = read_tum(path / POSES)
@@ -64,6 +65,10 @@ class FolderLog(ViewLog):
     @classmethod
     def recognises(cls, path: Path) -> bool:
         """Return whether a rig or a table of features exists; other formats have poses, too."""
+        if path.is_file():
+            return path.name in {RIG, POSES, ARCHIVE, *TABLES.values()} and cls.recognises(
+                path.parent
+            )
         return any((path / name).is_file() for name in (RIG, ARCHIVE, *TABLES.values()))
 
     def __len__(self) -> int:
