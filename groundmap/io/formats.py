@@ -11,16 +11,36 @@ from groundmap.files.opening import check_name
 from groundmap.io.folder import FolderLog
 from groundmap.io.gtsam import GtsamLog
 from groundmap.io.log import ViewLog
+from groundmap.io.readers.bal import BalLog
 from groundmap.io.readers.base import SparseMapLog
+from groundmap.io.readers.bundler import BundlerLog
 from groundmap.io.readers.colmap import ColmapLog
+from groundmap.io.readers.meshroom import MeshroomLog
+from groundmap.io.readers.nvm import NvmLog
+from groundmap.io.readers.openmvg import OpenMvgLog
+from groundmap.io.readers.openmvs import OpenMvsLog
+from groundmap.io.readers.opensfm import OpenSfmLog
 from groundmap.io.readers.orbslam import OrbSlamLog
 from groundmap.io.readers.refused import refusal_of
+from groundmap.io.readers.rosbag import RosbagLog
+from groundmap.io.readers.rtabmap import RtabmapLog
+from groundmap.io.readers.stella import StellaLog
 
 FORMATS: dict[str, type[ViewLog]] = {
     "gtsam": GtsamLog,
     "folder": FolderLog,
+    "bal": BalLog,
+    "bundler": BundlerLog,
     "colmap": ColmapLog,
+    "meshroom": MeshroomLog,
+    "nvm": NvmLog,
+    "openmvg": OpenMvgLog,
+    "openmvs": OpenMvsLog,
+    "opensfm": OpenSfmLog,
     "orbslam": OrbSlamLog,
+    "rosbag": RosbagLog,
+    "rtabmap": RtabmapLog,
+    "stella": StellaLog,
 }
 
 SHOWN_NAMES = 5  # of the files of an unknown folder

@@ -67,8 +67,8 @@ def _of_bearings(sparse: SparseMap) -> Floats:
     prior = np.where(seen, 1.0 / (UNKNOWN_DEPTH**2 * np.where(seen, nearest, 1.0)), 1.0)
     matrices = information[:, SYMMETRIC] + prior[:, None, None] * np.eye(3)
     inverse = np.linalg.inv(matrices)[group_of]
-    covariance: Floats = 0.5 * (inverse + np.swapaxes(inverse, 1, 2))
-    return covariance
+    symmetric: Floats = np.asarray(0.5 * (inverse + np.swapaxes(inverse, 1, 2)), np.float64)
+    return symmetric
 
 
 def _groups(ids: Ints) -> tuple[int, Ints]:

@@ -10,9 +10,9 @@ from pathlib import Path
 from groundmap.errors import FileFormatError
 from groundmap.files.opening import open_file
 from groundmap.io.readers.orbslam import TRAJECTORIES, kinds_in
+from groundmap.io.readers.sniffing import head_of
 
 WANTED = "poses, landmarks, and which view saw which"
-HEAD_BYTES = 4096
 IMAGES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp"}
 MOST_ENTRIES = 2000
 EXPORT_HINT = (
@@ -39,17 +39,6 @@ def refusal_of(path: Path) -> FileFormatError | None:
 Finding = tuple[str, str]  # what the file contains, and what to do
 
 
-def head_of(path: Path) -> bytes:
-    """Return the first bytes of a file; nothing for folders and unreadable files."""
-    if not path.is_file():
-        return b""
-    try:
-        with open_file(path) as stream:
-            return stream.read(HEAD_BYTES)
-    except (OSError, FileFormatError):
-        return b""
-
-
 def _files(path: Path) -> list[Path]:
     """Return a file, or the first entries of a folder."""
     return [path] if path.is_file() else sorted(islice(path.iterdir(), MOST_ENTRIES))
@@ -71,16 +60,10 @@ def _document(path: Path) -> Finding | None:
                 f"poses of nerfstudio or NeRF without visibility ({file.name})",
                 "Give the COLMAP folder from which it was made, such as colmap/sparse/0.",
             )
-        if re.search(r'"transform_matrix"|"applied_transform"', head):
+        if re.search(r'"transform_matrix"|"applied_transform"|"camera_angle_x"', head):
             return (
                 f"poses of nerfstudio without visibility ({file.name})",
                 "Give the COLMAP folder from which it was made, such as colmap/sparse/0.",
-            )
-        if file.suffix.lower() == ".sfm" or '"poseId"' in head:
-            return (
-                f"cameras of Meshroom without structure ({file.name})",
-                "Give the .sfm or .json file of the StructureFromMotion node that has 'structure', "
-                "or export it with ConvertSfMFormat.",
             )
     return None
 
@@ -127,7 +110,8 @@ def _text_tables(path: Path) -> Finding | None:
         got = f"a trajectory ({tracks[0]}) and points ({points[0]}) without visibility"
         return got, EXPORT_HINT
     if tracks:
-        return f"a trajectory alone ({tracks[0]})", f"The landmarks are missing. {EXPORT_HINT}"
+        hint = "The landmarks, and which view saw which, are missing: give the map that the same "
+        return f"a trajectory alone ({tracks[0]})", hint + "program saves, or see docs/sources."
     if points:
         got = f"points alone ({points[0]})"
         return got, "Put the trajectory of the cameras beside them, in TUM or KITTI form."

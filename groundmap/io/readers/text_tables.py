@@ -1,4 +1,4 @@
-"""Text files of SLAM systems, told apart by the columns of their first rows."""
+"""Text files of SLAM systems, recognised by the columns of their first rows."""
 
 from __future__ import annotations
 

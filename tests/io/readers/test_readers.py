@@ -16,11 +16,24 @@ from sparse_scene import Files, Scene, make_scene
 
 SCENE = make_scene()
 WRITERS: dict[str, Callable[[Scene], Files]] = {
+    "bal": sparse_scene.bal,
+    "bundler": sparse_scene.bundler,
     "colmap_binary": sparse_scene.colmap_binary,
     "colmap_text": sparse_scene.colmap_text,
+    "meshroom": sparse_scene.meshroom,
+    "nvm": sparse_scene.nvm,
+    "openmvg_binary": sparse_scene.openmvg_binary,
+    "openmvg_json": sparse_scene.openmvg_json,
+    "openmvs": sparse_scene.openmvs,
+    "opensfm": sparse_scene.opensfm,
     "orbslam": sparse_scene.orbslam,
+    "rtabmap": sparse_scene.rtabmap,
+    "stella_msgpack": sparse_scene.stella_msgpack,
+    "stella_sqlite": sparse_scene.stella_sqlite,
 }
-ROUNDED = {"orbslam"}  # written with nine digits
+MEASURED = {"rtabmap"}  # a landmark for each sighting
+# Written with nine digits, or with single precision.
+ATOL = {"orbslam": 1e-7, "openmvs": 1e-5, "rtabmap": 1e-5}
 
 
 def write(files: Files, folder: Path) -> Path:
@@ -48,13 +61,14 @@ def pairs_of(log: SparseMapLog) -> set[tuple[int, int]]:
 @pytest.mark.parametrize("name", WRITERS)
 def test_poses_landmarks_and_sightings_are_those_of_the_scene(name: str, tmp_path: Path) -> None:
     log = opened(write(WRITERS[name](SCENE), tmp_path / "map"))
-    sparse, atol = log.sparse, 1e-7 if name in ROUNDED else 1e-12
+    sparse, atol = log.sparse, ATOL.get(name, 1e-11)
     npt.assert_allclose(sparse.centres, SCENE.centres, atol=atol)
     npt.assert_allclose(sparse.T_world_camera[:, :3, :3], SCENE.rotations, atol=atol)
-    assert sparse.landmark_count == len(SCENE.landmarks)
-    npt.assert_allclose(
-        np.sort(sparse.landmarks, axis=0), np.sort(SCENE.landmarks, axis=0), atol=atol
-    )
+    if name in MEASURED:
+        assert sparse.landmark_count == len(SCENE.pairs)
+    else:
+        assert sparse.landmark_count == len(SCENE.landmarks)
+        npt.assert_allclose(sparse.landmarks, SCENE.landmarks, atol=atol)
     assert pairs_of(log) == set(SCENE.pairs)
 
 
