@@ -21,6 +21,7 @@ from groundmap.io.readers.openmvg import OpenMvgLog
 from groundmap.io.readers.openmvs import OpenMvsLog
 from groundmap.io.readers.opensfm import OpenSfmLog
 from groundmap.io.readers.orbslam import OrbSlamLog
+from groundmap.io.readers.points import PointsLog
 from groundmap.io.readers.refused import refusal_of
 from groundmap.io.readers.rosbag import RosbagLog
 from groundmap.io.readers.rtabmap import RtabmapLog
@@ -38,6 +39,7 @@ FORMATS: dict[str, type[ViewLog]] = {
     "openmvs": OpenMvsLog,
     "opensfm": OpenSfmLog,
     "orbslam": OrbSlamLog,
+    "points": PointsLog,
     "rosbag": RosbagLog,
     "rtabmap": RtabmapLog,
     "stella": StellaLog,

@@ -15,6 +15,7 @@ from groundmap.io.log import ViewLog
 from groundmap.io.poses import poses_by_id, poses_by_time, read_poses
 from groundmap.sparse.sparse_map import SparseMap
 from groundmap.sparse.views import SparseViews
+from groundmap.sparse.visibility import guess_visibility as guess_sightings
 from groundmap.view.view import View
 
 
@@ -52,6 +53,8 @@ class SparseMapLog(ViewLog):
             sparse = self.read_map(path)
             if poses is not None:
                 sparse = _with_poses(sparse, poses)
+            if guess_visibility and not sparse.sightings:
+                sparse = guess_sightings(sparse)
             check_usable(path, sparse)
             self.sparse = sparse
             self._views = SparseViews(sparse, point_noise=point_noise)

@@ -15,10 +15,7 @@ from groundmap.io.readers.sniffing import head_of
 WANTED = "poses, landmarks, and which view saw which"
 IMAGES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp"}
 MOST_ENTRIES = 2000
-EXPORT_HINT = (
-    "ORB-SLAM does not save which keyframe saw which point: docs/sources/orbslam.md has the few "
-    "lines that make it. --guess-visibility guesses it."
-)
+ATLAS_HINT = "Save the trajectory and the points with their keyframes: see docs/sources/orbslam.md."
 
 
 def refusal_of(path: Path) -> FileFormatError | None:
@@ -80,7 +77,7 @@ def _archive(path: Path) -> Finding | None:
         if b"serialization::archive" in head[:64] or file.suffix == ".osa":
             return (
                 f"an atlas of ORB-SLAM3, which only the same build reads ({file.name})",
-                EXPORT_HINT,
+                ATLAS_HINT,
             )
         if head.startswith((b"VERTEX_SE3", b"EDGE_SE3", b"VERTEX_SE2", b"EDGE_SE2")):
             return (
@@ -106,9 +103,6 @@ def _text_tables(path: Path) -> Finding | None:
     points = [file.name for file in kinds.get("points", [])]
     if path.is_file() and path.name not in tracks + points:
         return None
-    if tracks and points:
-        got = f"a trajectory ({tracks[0]}) and points ({points[0]}) without visibility"
-        return got, EXPORT_HINT
     if tracks:
         hint = "The landmarks, and which view saw which, are missing: give the map that the same "
         return f"a trajectory alone ({tracks[0]})", hint + "program saves, or see docs/sources."

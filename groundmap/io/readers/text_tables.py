@@ -67,7 +67,7 @@ def kind_of(path: Path) -> TextKind | None:
     except ValueError:
         return None
     widths = {len(row) for row in table}
-    if widths == {3}:
+    if widths in ({3}, {6}):
         return "points"
     if len(widths) == 1:
         kind = _pose_kind(np.array(table))
