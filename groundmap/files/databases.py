@@ -82,6 +82,28 @@ class Database:
         return FileFormatError(self.path, self.expected, f"a damaged one ({text})", hint=hint)
 
 
+def has_tables(path: str | PathLike[str], tables: set[str]) -> bool:
+    """Return whether a file is a database with certain tables.
+
+    Parameters
+    ----------
+    path : path
+    tables : set of str
+
+    Raises
+    ------
+    FileFormatError
+        The database is locked, so that its tables cannot be read.
+    """
+    try:
+        with open_database(path, "a database that can be read") as database:
+            return set(database.tables()) >= tables
+    except FileFormatError as error:
+        if error.hint:
+            raise
+        return False
+
+
 @contextmanager
 def open_database(path: str | PathLike[str], expected: str) -> Iterator[Database]:
     """Open a database for reading; its file is never changed.

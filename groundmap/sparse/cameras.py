@@ -12,7 +12,7 @@ from groundmap.printable import format_value
 
 Projection = Literal["perspective", "fisheye", "equirectangular"]
 USUAL_FOCAL_PX = 500.0  # of a camera about which the file says nothing
-MOST_PX = 1e9
+LEAST_FOCAL_PX, MOST_PX = 1e-3, 1e9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,8 +53,8 @@ class Camera:
     cx: float | None = None
 
     def __post_init__(self) -> None:
-        if not (is_number(self.focal_px) and 0 < self.focal_px <= MOST_PX):
-            expected = "a focal length above 0 [px]"
+        if not (is_number(self.focal_px) and LEAST_FOCAL_PX <= self.focal_px <= MOST_PX):
+            expected = f"a focal length above 0 [px], from {LEAST_FOCAL_PX:g} to {MOST_PX:g}"
             raise InputError(f"camera {self.model}", expected, format_value(self.focal_px))
         sizes = (self.width, self.height, 0 if self.cx is None else self.cx)
         if not all(is_number(size) and abs(size) <= MOST_PX for size in sizes):

@@ -12,6 +12,7 @@ PIXEL_NOISE_PX = 1.0  # of a keypoint of a SLAM or SfM system; half of them are 
 # Standard deviation of the depth that a single bearing leaves open, as a share of the distance.
 # Views drop features whose deviation exceeds their range.
 UNKNOWN_DEPTH = 10.0
+SMALLEST = 1e-12  # squared distance
 UPPER = np.triu_indices(3)
 SYMMETRIC = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
 
@@ -46,27 +47,55 @@ def landmark_covariance(sparse: SparseMap, *, point_noise: float | None = None) 
 
 def _of_bearings(sparse: SparseMap) -> Floats:
     assert sparse.ids is not None
-    offsets = sparse.offsets_from_cameras()
-    squared = np.einsum("ki,ki->k", offsets, offsets)
-    squared = np.maximum(squared, np.finfo(np.float64).tiny ** 0.25)
-    noise = np.array([camera.bearing_noise for camera in sparse.cameras])
     assert sparse.camera_of is not None
-    sigma = PIXEL_NOISE_PX * noise[sparse.camera_of[sparse.view_of]]
-    weight = 1.0 / (squared * sigma**2)
-    upper = -weight[:, None] * offsets[:, UPPER[0]] * offsets[:, UPPER[1]] / squared[:, None]
-    upper[:, [0, 3, 5]] += weight[:, None]
+    offsets = sparse.offsets_from_cameras()
+    noise = np.array([camera.bearing_noise for camera in sparse.cameras])
+    upper = bearing_information(offsets, noise[sparse.camera_of[sparse.view_of]])
     groups, group_of = _groups(sparse.ids)
     owner = group_of[sparse.landmark_of]
-    information = np.stack(
-        [np.bincount(owner, weights=column, minlength=groups) for column in upper.T], axis=1
-    )
-    # The depth is bounded, so that every landmark has a covariance.
+    sums = [np.bincount(owner, weights=column, minlength=groups) for column in upper.T]
+    information = np.stack(sums, axis=1).astype(np.float64)  # integers if there are no sightings
     nearest = np.full(groups, np.inf)
-    np.minimum.at(nearest, owner, squared)
-    seen = np.isfinite(nearest)
-    prior = np.where(seen, 1.0 / (UNKNOWN_DEPTH**2 * np.where(seen, nearest, 1.0)), 1.0)
-    matrices = information[:, SYMMETRIC] + prior[:, None, None] * np.eye(3)
-    inverse = np.linalg.inv(matrices)[group_of]
+    np.minimum.at(nearest, owner, np.einsum("ki,ki->k", offsets, offsets))
+    return invert_information(information, nearest)[group_of]
+
+
+def bearing_information(offsets: Floats, noise: Floats | float) -> Floats:
+    """Return the information of single bearings about a position, shape (k, 6) [1/unit²].
+
+    Parameters
+    ----------
+    offsets : ndarray, shape (k, 3)
+        From the cameras to the landmarks.
+    noise : ndarray, shape (k,), or float [rad]
+        Angle of one pixel.
+
+    Returns
+    -------
+    ndarray, shape (k, 6)
+        The upper halves of the symmetric matrices.
+    """
+    squared = np.maximum(np.einsum("ki,ki->k", offsets, offsets), SMALLEST)
+    weight = 1.0 / (squared * (PIXEL_NOISE_PX * np.asarray(noise)) ** 2)
+    upper: Floats = -weight[:, None] * offsets[:, UPPER[0]] * offsets[:, UPPER[1]]
+    upper /= squared[:, None]
+    upper[:, [0, 3, 5]] += weight[:, None]
+    return upper
+
+
+def invert_information(information: Floats, nearest: Floats) -> Floats:
+    """Return covariances from sums of `bearing_information`, shape (m, 3, 3).
+
+    Parameters
+    ----------
+    information : ndarray, shape (m, 6)
+    nearest : ndarray, shape (m,)
+        Squared distance from the nearest camera; infinite for a landmark that none saw.
+    """
+    # The depth is bounded, so that every landmark has a covariance.
+    distance = np.where(np.isfinite(nearest), np.maximum(nearest, SMALLEST), 1.0)
+    prior = 1.0 / (UNKNOWN_DEPTH**2 * distance)
+    inverse = np.linalg.inv(information[:, SYMMETRIC] + prior[:, None, None] * np.eye(3))
     symmetric: Floats = np.asarray(0.5 * (inverse + np.swapaxes(inverse, 1, 2)), np.float64)
     return symmetric
 

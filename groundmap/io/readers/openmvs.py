@@ -132,7 +132,8 @@ def _vertices(file: BinaryFile) -> _Vertices:
     count = file.count("vertices", smallest=20)
     points, seen = np.empty((count, 3)), []
     for vertex in range(count):
-        points[vertex] = file.records("<f4", 3, "vertex")
+        with np.errstate(invalid="ignore"):  # not a number, of a kind that signals
+            points[vertex] = file.records("<f4", 3, "vertex")
         views = file.count("views of a vertex", smallest=SIGHTING.itemsize)
         seen.append(file.records(SIGHTING, views, "views of a vertex")["image"])
     views_of = np.concatenate([np.empty(0, dtype=np.int64), *seen]).astype(np.int64)

@@ -14,13 +14,13 @@ from scipy.spatial.transform import Rotation
 
 from groundmap.arrays import Floats
 from groundmap.errors import FileFormatError, InputError
-from groundmap.files.databases import MAGIC, open_database
+from groundmap.files.databases import MAGIC, has_tables
+from groundmap.io.readers.bag_chunks import BAG1, MCAP, check_chunks
 from groundmap.io.readers.point_clouds import Cloud, WrongCloudError, id_field, read_cloud
 from groundmap.io.readers.sniffing import head_of
 from groundmap.io.readers.transforms import TransformTree
 
 EXPECTED = "a ROS bag"
-BAG1, MCAP = b"#ROSBAG V2.0", b"\x89MCAP0\r\n"
 CLOUD = "sensor_msgs/msg/PointCloud2"
 TF = "tf2_msgs/msg/TFMessage"
 OLD_TF = "tf/msg/tfMessage"
@@ -65,11 +65,7 @@ def is_bag(path: Path) -> bool:
         return True
     if not head.startswith(MAGIC):
         return False
-    try:
-        with open_database(path, EXPECTED) as database:
-            return set(database.tables()) >= {"topics", "messages"}
-    except FileFormatError:
-        return False
+    return has_tables(path, {"topics", "messages"})
 
 
 def read_bag(path: Path) -> BagContent:
@@ -83,6 +79,7 @@ def read_bag(path: Path) -> BagContent:
         A damaged bag.
     """
     try:
+        import apsw
         from rosbags.highlevel import AnyReader, AnyReaderError
         from rosbags.rosbag1 import ReaderError as ReaderError1
         from rosbags.rosbag2 import ReaderError as ReaderError2
@@ -91,9 +88,10 @@ def read_bag(path: Path) -> BagContent:
     except ImportError as error:
         hint = "pip install 'groundmap[bags]'"
         raise InputError(str(path), "the library rosbags for bags", "none", hint=hint) from error
-    own = (AnyReaderError, ReaderError1, ReaderError2, SerdeError, TypesysError)
+    own = (AnyReaderError, ReaderError1, ReaderError2, SerdeError, TypesysError, apsw.Error)
     content = BagContent()
     try:
+        check_chunks(path)
         with AnyReader([path]) as reader:
             _read(path, reader, content)
     except InputError:

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from groundmap.arrays import Floats, Ints
 from groundmap.errors import FileFormatError
-from groundmap.files.databases import MAGIC, Database, open_database
+from groundmap.files.databases import MAGIC, Database, has_tables, open_database
 from groundmap.io.readers.base import SparseMapLog
 from groundmap.io.readers.rtabmap_calibration import Calibration, read_calibration
 from groundmap.io.readers.sniffing import head_of, single_file
@@ -60,11 +60,7 @@ def is_rtabmap(path: Path) -> bool:
     """Return whether a file is a database with RTAB-Map's tables."""
     if not head_of(path).startswith(MAGIC):
         return False
-    try:
-        with open_database(path, EXPECTED) as database:
-            return set(database.tables()) >= TABLES
-    except FileFormatError:
-        return False
+    return has_tables(path, TABLES)
 
 
 class _Node(NamedTuple):

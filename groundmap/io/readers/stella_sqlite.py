@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundmap.errors import FileFormatError
-from groundmap.files.databases import Database, open_database
+from groundmap.files.databases import Database, has_tables, open_database
 from groundmap.files.documents import WrongDocumentError, parse_json
 from groundmap.io.readers.assembly import compose
 from groundmap.io.readers.fields import Fields
@@ -22,11 +22,7 @@ KEYPOINT = np.dtype([("pt", "<f4", (2,)), ("rest", "<f4", (5,))])  # OpenCV's Ke
 
 def is_stella_database(path: Path) -> bool:
     """Return whether a database has the tables of a map."""
-    try:
-        with open_database(path, EXPECTED) as database:
-            return set(database.tables()) >= TABLES
-    except FileFormatError:
-        return False
+    return has_tables(path, TABLES)
 
 
 def read_database(path: Path) -> StellaMap:
