@@ -10,9 +10,9 @@ from itertools import product
 import numpy as np
 from scipy import ndimage
 
-from groundmap.arrays import Bools, Floats, Ints
+from groundmap.arrays import Bools, Floats
 from planners.costmap.costmap import Costmap
-from planners.costmap.endpoints import centres_around, links
+from planners.costmap.endpoints import links
 from planners.costmap.map_space import MapSpace
 from planners.costmap.voxel_map import Voxels
 from planners.error_messages import Place, Point, format_point
@@ -197,22 +197,12 @@ def region_around(
         Whether to return the largest region if the place is connected to no cell.
     """
     parts, count = ndimage.label(free)
-    around = np.unique(parts[tuple(_cells_around(space, xy, radius=radius).T)])
+    around = np.unique(parts[tuple(links(space, xy, radius=radius).cells.T)])
     around = around[around > 0]
     if or_largest and len(around) == 0 and count > 0:
         around = np.array([1 + np.bincount(parts.ravel())[1:].argmax()])
     region: Bools = np.isin(parts, around)
     return region
-
-
-def _cells_around(space: MapSpace, xy: Point, *, radius: float) -> Ints:
-    """Return the cells that a place is connected to; on voxels, the up to eight around it."""
-    if isinstance(space, Costmap):
-        return links(space, xy, radius=radius).cells
-    position = space.to_cells(xy)[0][::-1]
-    around = product(*(centres_around(at, 0.0) for at in position.tolist()))
-    cells = np.array(list(around), dtype=np.int64)
-    return cells[space.window.contains(cells)]
 
 
 def _check_in_window(space: MapSpace, place: Place, xy: Point) -> None:

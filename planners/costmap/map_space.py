@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -11,8 +12,8 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import Bools, Floats, Ints, Ints32
-from groundmap.grid.window import GridWindow
+from groundmap.arrays import Bools, Counts, Floats, Floats32, Ints, Ints32
+from groundmap.grid.window import CellFrame
 from planners.costmap.kernels.distance import (
     NOWHERE,
     squared_distances,
@@ -25,7 +26,12 @@ from planners.geometry.rounding import slack_at
 from planners.problem.problem import PlanningProblem
 
 FIRST_REACH = 64  # [cells] initial search distance around cells
+MOST_CELLS = 2**23  # in a box around cells; more cells are cut into parts, as along a route
 SQUARED_DISTANCES = {2: squared_distances, 3: squared_distances_3d}
+SEGMENT_CLEARANCE = {
+    2: lambda blocked, a, b, limit: clearance.segment_clearance(blocked, *a, *b, limit),
+    3: clearance3d.segment_clearance,
+}
 LINE_CLEARANCE = {2: clearance.line_clearance, 3: clearance3d.line_clearance}
 
 
@@ -36,7 +42,7 @@ class MapSpace(ABC):
     Attributes
     ----------
     problem : PlanningProblem
-    window : GridWindow
+    window : GridWindow, or CellBox on a 3-D map
         The observed tiles, surrounded by a ring of unknown cells that also encloses the cleared
         start. The ring stands for all unknown space outside.
     blocked, nonfree, cleared : ndarray of bool, shape (rows, cols) or (layers, rows, cols)
@@ -45,7 +51,7 @@ class MapSpace(ABC):
     """
 
     problem: PlanningProblem
-    window: GridWindow
+    window: CellFrame
     blocked: Bools
     nonfree: Bools
     cleared: Bools
@@ -54,6 +60,19 @@ class MapSpace(ABC):
     @abstractmethod
     def traversable(self) -> Bools:
         """Cells on whose centre the footprint's centre may be, shape as `blocked`."""
+
+    @abstractmethod
+    def evidence_at(self, cells: Ints) -> tuple[Floats32, Counts]:
+        """Return the confidence and the count of cells, given by their indices, shape (n,) each."""
+
+    @property
+    @abstractmethod
+    def uniform(self) -> bool:
+        """Whether all cells have the same cost."""
+
+    @abstractmethod
+    def weights_at(self, cells: Ints) -> Floats:
+        """Return what a metre costs in cells, given by their indices, shape (n,) [m/m]."""
 
     @property
     def radius(self) -> float:
@@ -88,6 +107,9 @@ class MapSpace(ABC):
     def _squared_at(self, cells: Ints) -> Ints32:
         """Return `all_squared` at cells, computed only in as large a box around them as needed."""
         first, last, reach = cells.min(axis=0), cells.max(axis=0) + 1, FIRST_REACH
+        if len(cells) > 1 and math.prod((last - first + 2 * reach).tolist()) > MOST_CELLS:
+            halves = np.array_split(cells, 2)
+            return np.concatenate([self._squared_at(half) for half in halves])
         while True:
             low = np.maximum(first - reach, 0)
             high = np.minimum(last + reach, self.blocked.shape)
@@ -106,6 +128,20 @@ class MapSpace(ABC):
     def area_of(self, cells: Bools) -> float:
         """Return the area of the cells of a mask [m²], on a 3-D map their volume [m³]."""
         return float(cells.sum()) * self.window.resolution**cells.ndim
+
+    def segment_clearance(self, a: Sequence[float], b: Sequence[float], limit: float) -> float:
+        """Return the distance from a segment to the nearest blocked cell, at most `limit` [cells].
+
+        Parameters
+        ----------
+        a, b : sequence of float, x first [cells]
+            Ends of the segment.
+        limit : float [cells]
+            Largest distance to search.
+        """
+        points = np.array(a, dtype=np.float64), np.array(b, dtype=np.float64)
+        segment_clearance = SEGMENT_CLEARANCE[self.blocked.ndim]
+        return float(segment_clearance(self.blocked, *points, limit))
 
     def clearance_of(
         self, points: npt.ArrayLike, *, to: Bools | None = None, limit: float = math.inf

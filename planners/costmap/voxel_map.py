@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from groundmap.arrays import Bools
-from planners.costmap.extent import padded_window
+import numpy as np
+
+from groundmap.arrays import Bools, Counts, Floats, Floats32, Ints
+from planners.costmap.extent import padded_box
 from planners.costmap.layers import occupancy_of
 from planners.costmap.map_space import MapSpace
 from planners.errors import ProblemError
@@ -46,11 +48,32 @@ class Voxels(MapSpace):
         if problem.costs.top(penalise=False) > 0:
             expected = "no costs except length on a 3-D map"
             raise ProblemError("costs", expected, repr(problem.costs))
-        window = padded_window(problem)
-        blocked, nonfree, cleared, _ = occupancy_of(problem, window)
-        return cls(problem, window, blocked, nonfree, cleared)
+        box = padded_box(problem)
+        masks = tuple(np.zeros(box.shape, dtype=np.bool_) for _ in range(3))
+        layer = 0
+        for slab in box.slabs():  # a dense window of a large map would need ten times the memory
+            layers = slice(layer, layer + slab.shape[0])
+            occupancy = occupancy_of(problem, problem.grid.read(slab))
+            for mask, part in zip(masks, occupancy, strict=False):
+                mask[layers] = part
+            layer = layers.stop
+        return cls(problem, box, *masks)
 
     @cached_property
     def traversable(self) -> Bools:
         """Voxels on whose centre the footprint's centre may be, shape (layers, rows, cols)."""
         return self.traversable_for(self.radius) if self.radius > 0 else ~self.blocked
+
+    def evidence_at(self, cells: Ints) -> tuple[Floats32, Counts]:
+        """Return the confidence and the count of voxels of the map, shape (n,) each."""
+        grid, centres = self.problem.grid, self.window.cell_to_world(cells)
+        return grid.confidence_at(centres), grid.count_at(centres)
+
+    @property
+    def uniform(self) -> bool:
+        """Whether all voxels have the same cost: always."""
+        return True
+
+    def weights_at(self, cells: Ints) -> Floats:
+        """Return what a metre costs in voxels, given by their indices: 1, shape (n,) [m/m]."""
+        return np.ones(len(cells))
