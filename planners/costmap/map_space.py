@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -28,11 +28,17 @@ from planners.problem.problem import PlanningProblem
 FIRST_REACH = 64  # [cells] initial search distance around cells
 MOST_CELLS = 2**23  # in a box around cells; more cells are cut into parts, as along a route
 SQUARED_DISTANCES = {2: squared_distances, 3: squared_distances_3d}
-SEGMENT_CLEARANCE = {
-    2: lambda blocked, a, b, limit: clearance.segment_clearance(blocked, *a, *b, limit),
+LINE_CLEARANCE = {2: clearance.line_clearance, 3: clearance3d.line_clearance}
+
+
+def _segment_clearance_2d(blocked: Bools, a: Floats, b: Floats, limit: float) -> float:
+    return float(clearance.segment_clearance(blocked, a[0], a[1], b[0], b[1], limit))
+
+
+SEGMENT_CLEARANCE: dict[int, Callable[[Bools, Floats, Floats, float], float]] = {
+    2: _segment_clearance_2d,
     3: clearance3d.segment_clearance,
 }
-LINE_CLEARANCE = {2: clearance.line_clearance, 3: clearance3d.line_clearance}
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +147,7 @@ class MapSpace(ABC):
         """
         points = np.array(a, dtype=np.float64), np.array(b, dtype=np.float64)
         segment_clearance = SEGMENT_CLEARANCE[self.blocked.ndim]
-        return float(segment_clearance(self.blocked, *points, limit))
+        return segment_clearance(self.blocked, *points, limit)
 
     def clearance_of(
         self, points: npt.ArrayLike, *, to: Bools | None = None, limit: float = math.inf

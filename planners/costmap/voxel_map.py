@@ -67,7 +67,7 @@ class Voxels(MapSpace):
     def evidence_at(self, cells: Ints) -> tuple[Floats32, Counts]:
         """Return the confidence and the count of voxels of the map, shape (n,) each."""
         grid, centres = self.problem.grid, self.window.cell_to_world(cells)
-        return grid.confidence_at(centres), grid.count_at(centres)
+        return np.asarray(grid.confidence_at(centres)), np.asarray(grid.count_at(centres))
 
     @property
     def uniform(self) -> bool:

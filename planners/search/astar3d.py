@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from groundmap.arrays import Bools, Floats, Ints
+from groundmap.arrays import Floats, Ints
 from planners.costmap.endpoints import Ends, ends_of, waypoints_through
 from planners.costmap.voxel_map import Voxels
 from planners.problem.problem import Pose
@@ -58,7 +58,17 @@ class AStar3D(GridSearch):
         return Ends(sources + BORDER, targets + BORDER, direct)
 
     def _seed(self, query: GridQuery) -> None:
-        seed(*query.ends[:2], self.width, self.slab, *self._labels(), self.heap, self.state)
+        seed(
+            query.ends.sources,
+            query.ends.targets,
+            self.width,
+            self.slab,
+            self.labels,
+            self.touched,
+            self.chunks,
+            self.heap,
+            self.state,
+        )
 
     def _advance(self, query: GridQuery) -> int:
         plane, stride = self.bits.strides[:2]
@@ -69,15 +79,13 @@ class AStar3D(GridSearch):
             self.width,
             self.slab,
             query.ends.targets,
-            *self._labels(),
+            self.labels,
+            self.touched,
+            self.chunks,
             self.heap,
             self.state,
             self.slice_size,
         )
-
-    def _labels(self) -> tuple[Ints, Bools, Ints]:
-        """Return the labels and the chunks in which there are any, as kernels take them."""
-        return self.labels, self.touched, self.chunks
 
     def _trace(self) -> Ints:
         turns = trace(self.labels, self.width, self.slab, int(self.state[TARGET]))[::-1]

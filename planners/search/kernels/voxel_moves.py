@@ -122,13 +122,13 @@ def around(bits: Bytes, plane: int, stride: int, layer: int, row: int, col: int)
     """
     first = (layer - 1) * plane + (row - 1) * stride + ((col - 1) >> 3)
     shift = (col - 1) & 7
-    mask = 0
+    mask = np.int64(0)
     for i in range(3):
         for j in range(3):
             at = first + i * plane + j * stride
             pair = np.int64(bits[at]) | (np.int64(bits[at + 1]) << 8)
             mask |= ((pair >> shift) & 7) << (9 * i + 3 * j)
-    return mask
+    return int(mask)
 
 
 @njit(cache=True, nogil=True)
