@@ -115,8 +115,9 @@ def touched_voxels(world: World, box: CellFrame) -> Bools:
     upper = lower + box.resolution - 2.0 * HAIR
     place = box.origin[:2], box.resolution, box.shape[1:]
     for solid in world.solids:
-        layers = (lower < solid.top) & (upper > solid.bottom)
-        touched[layers] |= touched_cells(solid.outline, *place)
+        over = touched_cells(solid.outline, *place)
+        layers = np.flatnonzero((lower < solid.top) & (upper > solid.bottom))
+        touched[layers] |= over & (lower[layers, None, None] < _highest(solid, *place))
     floor = np.zeros(box.shape[1:])
     for hole in world.holes:  # a cell that is only partly over a hole overlaps the ground beside it
         beside = hole.outline.buffer(2.0 * box.resolution).difference(hole.outline)
@@ -124,6 +125,16 @@ def touched_voxels(world: World, box: CellFrame) -> Bools:
         floor[over] = -hole.depth
     touched |= lower[:, None, None] < floor
     return touched
+
+
+def _highest(solid: Solid, origin: Floats, resolution: float, shape: tuple[int, ...]) -> Floats:
+    """Return the highest point of a solid's upper side over each cell, shape (rows, cols) [m]."""
+    level, along_x, along_y = solid.upper_plane
+    x, y = (origin[axis] + np.arange(shape[1 - axis]) * resolution for axis in range(2))
+    rise_x = np.maximum(along_x * x, along_x * (x + resolution))
+    rise_y = np.maximum(along_y * y, along_y * (y + resolution))
+    heights: Floats = np.minimum(level + rise_x + rise_y[:, None], solid.top)
+    return heights
 
 
 def _in_images(
@@ -154,11 +165,13 @@ def _on_surfaces(solids: tuple[Solid, ...], step: float) -> Floats:
         count = int(np.ceil((solid.top - solid.bottom) / step))
         shares = (np.arange(count) + 0.5) / count
         sides = along_outlines(solid.outline, step)
+        tops = solid.top_at(sides)
         for z in (solid.bottom + shares * (solid.top - solid.bottom)).tolist():
-            pieces.append(np.column_stack([sides, np.full(len(sides), z)]))
+            at = sides[tops >= z]
+            pieces.append(np.column_stack([at, np.full(len(at), z)]))
         inner = _inside(solid.outline, step)
-        for z in (solid.bottom - HAIR, solid.top + HAIR):
-            pieces.append(np.column_stack([inner, np.full(len(inner), z)]))
+        for heights in (np.full(len(inner), solid.bottom - HAIR), solid.top_at(inner) + HAIR):
+            pieces.append(np.column_stack([inner, heights]))
     return np.concatenate(pieces)
 
 
@@ -175,14 +188,18 @@ def _inside(outline: shapely.Polygon, step: float) -> Floats:
 
 
 def _distances(solids: tuple[Solid, ...], points: Floats) -> Floats:
-    """Return the distances of points to the nearest solid [m]; inside, minus the depth."""
+    """Return the distances of points to the nearest solid [m]; inside, minus the depth.
+
+    The upper side of a solid with a slope is taken for a plane without borders.
+    """
     nearest = np.full(len(points), np.inf)
     marks, z = shapely.points(points[:, :2]), points[:, 2]
     for solid in solids:
         shapely.prepare(solid.outline)
         aside = shapely.distance(solid.outline.boundary, marks)
         aside[shapely.contains_xy(solid.outline, points[:, :2])] *= -1.0
-        above = np.maximum(solid.bottom - z, z - solid.top)
+        steepness = float(np.hypot(1.0, np.hypot(*solid.slope)))
+        above = np.maximum(solid.bottom - z, (z - solid.top_at(points[:, :2])) / steepness)
         outside = np.hypot(np.maximum(aside, 0.0), np.maximum(above, 0.0))
         inside = np.minimum(np.maximum(aside, above), 0.0)
         nearest = np.minimum(nearest, outside + inside)

@@ -69,7 +69,8 @@ def test_voxels_and_sight_are_those_of_boxes(rng: np.random.Generator) -> None:
     overlap = (centres[:, None] + half > corners[:, :3]) & (
         centres[:, None] - half < corners[:, 3:]
     )
-    np.testing.assert_array_equal(known.nonfree.ravel(), overlap.all(axis=2).any(axis=1))
+    overlaps = np.logical_and.reduce(overlap, axis=2).any(axis=1)
+    np.testing.assert_array_equal(known.nonfree.ravel(), overlaps)
     eyes = [np.array([x, y, SENSOR.camera_height]) for x, y, _ in POSES]
     in_line = ~np.all([hits(eye, centres, corners) for eye in eyes], axis=0)
     np.testing.assert_array_equal(known.in_line.ravel(), in_line)
@@ -153,3 +154,24 @@ def test_a_free_voxel_deep_in_a_solid_and_a_non_free_one_in_the_air_are_found() 
     assert found.nonfree_precision is not None
     assert 1 - found.nonfree_precision <= 1 / judged
     assert found.nonfree_precision < 1.0
+
+
+def test_voxels_below_a_slope_are_non_free() -> None:
+    box = ConfidenceGrid(resolution=0.25, origin=(0, 0, 0)).box((0, 0, 0, 4, 1, 2))
+    ramp = Solid(shapely.box(0.0, 0.0, 4.0, 1.0), top=2.0, slope=(0.5, 0.0))
+    touched = touched_voxels(World(bounds=BOUNDS, solids=(ramp,)), box)
+    highest = 0.5 * 0.25 * np.arange(1, 17)  # at the right border of each column
+    expected = 0.25 * np.arange(8)[:, None, None] < np.broadcast_to(highest, (4, 16)) - 1e-5
+    np.testing.assert_array_equal(touched, expected)
+
+
+def test_the_surface_of_a_ramp_is_its_slope() -> None:
+    ramp = Solid(shapely.box(2.0, 0.0, 5.0, 5.0), top=1.5, slope=(0.5, 0.0))
+    known = truth(World(bounds=BOUNDS, solids=(ramp,)), voxels())
+    np.testing.assert_allclose(known.to_borders(known.surfaces), 0.0, atol=1e-5)
+    x, _, z = known.surfaces.T
+    on_slope = x > 2.01
+    np.testing.assert_allclose(z[on_slope], 0.5 * (x[on_slope] - 2.0), atol=1e-5)
+    assert on_slope.sum() > 100
+    place = np.array([(3.0, 2.5, 0.5 + np.sqrt(1.25))])
+    assert known.to_obstacles(place)[0] == pytest.approx(1.0)
