@@ -108,12 +108,10 @@ class CellBox(CellFrame):
         most_cells : int, default 2**22
             Cells of a slab; one row or layer is never cut.
         """
-        thickness = max(1, most_cells // max(1, math.prod(self.shape[1:])))
-        for first in range(0, self.shape[0], thickness):
+        for part in slabs(self.shape, most_cells):
             lower, upper, origin = self.lower.copy(), self.upper.copy(), self.origin.copy()
-            lower[0] += first
-            upper[0] = min(lower[0] + thickness, self.upper[0])
-            origin[-1] += first * self.resolution
+            lower[0], upper[0] = self.lower[0] + part.start, self.lower[0] + part.stop
+            origin[-1] += part.start * self.resolution
             yield CellBox(lower, upper, origin, self.resolution)
 
 
@@ -159,10 +157,31 @@ class GridWindow(CellFrame):
         return states
 
 
+def slabs(shape: tuple[int, ...], most_cells: int = SLAB_CELLS) -> Iterator[slice]:
+    """Yield slices of the first axis that together are a box of cells, in order.
+
+    Parameters
+    ----------
+    shape : tuple of int
+    most_cells : int, default 2**22
+        Cells of a slab; one row or layer is never cut.
+    """
+    thickness = max(1, most_cells // max(1, math.prod(shape[1:])))
+    for first in range(0, shape[0], thickness):
+        yield slice(first, min(first + thickness, shape[0]))
+
+
 def cells_of(xy: npt.ArrayLike, origin: Floats, resolution: float) -> Ints:
     """Return the cells of positions: axes reversed, borders belong to the cell they open.
 
     Positions beyond `FARTHEST_CELL`, where no grid has anything, get that cell.
+
+    Parameters
+    ----------
+    xy : array_like, shape (d,) or (n, d) [m, map]
+    origin : ndarray, shape (d,) [m, map]
+        Outer corner of cell (0, 0).
+    resolution : float [m]
     """
     positions = as_positions("xy", xy, len(origin))
     return scaled_cells(np.floor, positions, origin, resolution)
@@ -171,7 +190,16 @@ def cells_of(xy: npt.ArrayLike, origin: Floats, resolution: float) -> Ints:
 def scaled_cells(
     rounded: Callable[[Floats], Floats], positions: Floats, origin: Floats, resolution: float
 ) -> Ints:
-    """Return positions, shape (n, d), in cells ``[row, col]``, rounded up or down."""
+    """Return positions in cells ``[row, col]``, rounded up or down, shape (n, d).
+
+    Parameters
+    ----------
+    rounded : callable
+        `numpy.floor` or `numpy.ceil`.
+    positions : ndarray, shape (n, d) [m, map]
+    origin : ndarray, shape (d,) [m, map]
+    resolution : float [m]
+    """
     with np.errstate(over="ignore"):
         scaled = (positions - origin) / resolution
     cells = np.clip(rounded(scaled), -FARTHEST_CELL, FARTHEST_CELL)
@@ -179,6 +207,13 @@ def scaled_cells(
 
 
 def centres_of(cells: npt.ArrayLike, origin: Floats, resolution: float) -> Floats:
-    """Return the centres of cells."""
+    """Return the centres of cells, shape (n, d) [m, map].
+
+    Parameters
+    ----------
+    cells : array_like of int, shape (d,) or (n, d)
+    origin : ndarray, shape (d,) [m, map]
+    resolution : float [m]
+    """
     index = as_cells("cells", cells, len(origin))
     return origin + (index[:, ::-1] + 0.5) * resolution

@@ -195,7 +195,15 @@ def _still_there(samples: Floats, now: World, heights: tuple[float, float]) -> B
 
 
 def along_outlines(obstacles: shapely.Geometry, step: float) -> Floats:
-    """Return points `HAIR` in front of all edges, at most `step` apart, shape (n, 2) [m]."""
+    """Return points `HAIR` in front of all edges, shape (n, 2) [m].
+
+    Parameters
+    ----------
+    obstacles : shapely.Geometry [m, map]
+        One or more polygons.
+    step : float [m]
+        Largest distance between points of an edge.
+    """
     pieces = [np.empty((0, 2))]
     for edge in edges_of(shapely.orient_polygons(obstacles)):
         start, along = edge[:2], edge[2:] - edge[:2]

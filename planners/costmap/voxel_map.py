@@ -4,15 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from groundmap.arrays import Bools, Counts, Floats, Floats32, Ints
 from planners.costmap.extent import padded_box
+from planners.costmap.kernels.distance import NOWHERE, fill_squared_distances_3d
 from planners.costmap.layers import occupancy_of
 from planners.costmap.map_space import MapSpace
+from planners.costmap.moves import squared_need
 from planners.errors import ProblemError
 from planners.problem.problem import PlanningProblem
+
+FARTHEST_SQUARED = np.iinfo(np.uint16).max  # [(half voxels)²]: 128 voxels
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +69,27 @@ class Voxels(MapSpace):
     def traversable(self) -> Bools:
         """Voxels on whose centre the footprint's centre may be, shape (layers, rows, cols)."""
         return self.traversable_for(self.radius) if self.radius > 0 else ~self.blocked
+
+    @cached_property
+    def near_squared(self) -> npt.NDArray[np.unsignedinteger[Any]]:
+        """Squared distances as in `all_squared`, but cut to a cap, in half of its memory or more.
+
+        The cap is that of 16 bits, or what the radius needs: a larger distance only tells that the
+        next blocked voxel is farther away.
+        """
+        need = squared_need(self.radius + self.slack, self.window.resolution)
+        cap = min(max(FARTHEST_SQUARED, need), NOWHERE)
+        kind = np.uint16 if cap == FARTHEST_SQUARED else np.uint32
+        squared = np.empty(self.blocked.shape, dtype=kind)
+        fill_squared_distances_3d(self.blocked, cap, squared)
+        return squared
+
+    def traversable_for(self, radius: float) -> Bools:
+        """Return where the centre of a ball of another radius [m] may be."""
+        if radius > self.radius:
+            return super().traversable_for(radius)
+        need = squared_need(radius, self.window.resolution)
+        return ~self.blocked & (self.near_squared >= need)
 
     def evidence_at(self, cells: Ints) -> tuple[Floats32, Counts]:
         """Return the confidence and the count of voxels of the map, shape (n,) each."""

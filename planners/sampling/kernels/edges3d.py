@@ -12,7 +12,6 @@ import numpy as np
 from numba import njit
 
 from groundmap.arrays import Ints32
-from planners.costmap.kernels.distance import NOWHERE
 
 NEAR = 0.2  # [voxels] margin of clearance below which a line is checked exactly
 PIECE = 1.0  # [voxels] longest piece of a line that is checked exactly
@@ -40,8 +39,8 @@ def line_clear(
 
     Parameters
     ----------
-    squared : ndarray of int32, shape (layers, rows, cols)
-        As `MapSpace.all_squared`.
+    squared : ndarray of uint16 or uint32, shape (layers, rows, cols)
+        As `Voxels.near_squared`: at least what the radius needs, where it is cut.
     size : float [m]
         Side of a voxel.
     radius : float [m]
@@ -108,7 +107,7 @@ def _nearness(squared: Ints32, x: float, y: float, z: float) -> tuple[float, flo
     at = squared[layer, row, col]
     u, v, w = x - col - 0.5, y - row - 0.5, z - layer - 0.5
     off = math.sqrt(u * u + v * v + w * w)
-    clearance = math.inf if at == NOWHERE else 0.5 * math.sqrt(at)
+    clearance = 0.5 * math.sqrt(at)
     return clearance - off, clearance + off
 
 

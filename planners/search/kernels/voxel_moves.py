@@ -133,7 +133,15 @@ def around(bits: Bytes, plane: int, stride: int, layer: int, row: int, col: int)
 
 @njit(cache=True, nogil=True)
 def is_useful(arrival: int, move: int, around: int) -> bool:
-    """Whether a move is allowed and not pruned."""
+    """Whether a move is allowed and not pruned.
+
+    Parameters
+    ----------
+    arrival, move : int
+        The move that led to the node, and the next one.
+    around : int
+        Mask of the voxels around the node.
+    """
     if (around & NEEDS[move]) != NEEDS[move]:
         return False
     detour = DETOURS[arrival, move]
