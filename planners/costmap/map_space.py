@@ -26,7 +26,6 @@ from planners.geometry.rounding import slack_at
 from planners.problem.problem import PlanningProblem
 
 FIRST_REACH = 64  # [cells] initial search distance around cells
-MOST_CELLS = 2**23  # in a box around cells; more cells are cut into parts, as along a route
 SQUARED_DISTANCES = {2: squared_distances, 3: squared_distances_3d}
 LINE_CLEARANCE = {2: clearance.line_clearance, 3: clearance3d.line_clearance}
 
@@ -113,9 +112,6 @@ class MapSpace(ABC):
     def _squared_at(self, cells: Ints) -> Ints32:
         """Return `all_squared` at cells, computed only in as large a box around them as needed."""
         first, last, reach = cells.min(axis=0), cells.max(axis=0) + 1, FIRST_REACH
-        if len(cells) > 1 and math.prod((last - first + 2 * reach).tolist()) > MOST_CELLS:
-            halves = np.array_split(cells, 2)
-            return np.concatenate([self._squared_at(half) for half in halves])
         while True:
             low = np.maximum(first - reach, 0)
             high = np.minimum(last + reach, self.blocked.shape)

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import Bools, Counts, Floats, Floats32, Ints
+from groundmap.arrays import Bools, Counts, Floats, Floats32, Ints, Ints32
 from planners.costmap.extent import padded_box
 from planners.costmap.kernels.distance import NOWHERE, fill_squared_distances_3d
 from planners.costmap.layers import occupancy_of
 from planners.costmap.map_space import MapSpace
 from planners.costmap.moves import squared_need
 from planners.errors import ProblemError
+from planners.geometry.kernels.clearance3d import squared_along
 from planners.problem.problem import PlanningProblem
 
 FARTHEST_SQUARED = np.iinfo(np.uint16).max  # [(half voxels)²]: 128 voxels
@@ -90,6 +91,10 @@ class Voxels(MapSpace):
             return super().traversable_for(radius)
         need = squared_need(radius, self.window.resolution)
         return ~self.blocked & (self.near_squared >= need)
+
+    def _squared_at(self, cells: Ints) -> Ints32:
+        # A box around a long line would be most of the map.
+        return squared_along(self.blocked, cells, NOWHERE).astype(np.int32)
 
     def evidence_at(self, cells: Ints) -> tuple[Floats32, Counts]:
         """Return the confidence and the count of voxels of the map, shape (n,) each."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import mmap
+
 import numpy as np
 
 from groundmap.arrays import Floats, Ints
@@ -13,6 +15,7 @@ from planners.search.kernels.astar import TARGET
 from planners.search.kernels.astar3d import CHUNK, USED, advance, seed, trace
 from planners.search.kernels.voxel_moves import bits_of
 
+SMALL_PAGES = getattr(mmap, "MADV_NOHUGEPAGE", None)
 BORDER = np.array([1, 1, 1, 0])  # indices of the search count its border; costs do not
 
 
@@ -47,8 +50,7 @@ class AStar3D(GridSearch):
         layers, rows, cols = (side + 2 for side in voxels.blocked.shape)
         self.width, self.slab = cols, rows * cols
         chunks = -(-layers * self.slab // CHUNK)
-        # The system provides the memory of zeros when they are first written.
-        self.labels = np.zeros(chunks * CHUNK, dtype=np.int64)
+        self.labels = zeros_on_demand(chunks * CHUNK)
         self.touched = np.zeros(chunks, dtype=np.bool_)
         self.chunks = np.zeros(chunks, dtype=np.int64)
         self.state = np.zeros(USED + 1, dtype=np.int64)
@@ -94,3 +96,21 @@ class AStar3D(GridSearch):
 
     def _line(self, query: GridQuery, cells: Ints) -> Floats:
         return waypoints_through(self.voxels, query.start, query.goal, cells)
+
+
+def zeros_on_demand(count: int) -> Ints:
+    """Return zeros that take memory only where they are written, in the system's smallest pages.
+
+    NumPy asks for huge pages, of which a route across a map would touch most.
+
+    Examples
+    --------
+    >>> zeros_on_demand(3)
+    array([0, 0, 0])
+    """
+    size = 8 * count
+    if SMALL_PAGES is None:
+        return np.zeros(count, dtype=np.int64)
+    memory = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    memory.madvise(SMALL_PAGES)
+    return np.frombuffer(memory, dtype=np.int64)

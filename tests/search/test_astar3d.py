@@ -25,7 +25,7 @@ from planners.audit.audit import audit
 from planners.audit.obstacles import segment_boxes
 from planners.costmap.kernels.distance import NOWHERE, squared_distances_3d
 from planners.costmap.voxel_map import Voxels
-from planners.geometry.kernels.clearance3d import cube_distance, line_clearance
+from planners.geometry.kernels.clearance3d import cube_distance, line_clearance, squared_along
 from planners.search.astar3d import AStar3D
 from planners.search.base import SearchResult, SearchSettings
 from planners.search.kernels.voxel_moves import COSTS, STEPS, around, bits_of, estimate
@@ -443,3 +443,13 @@ def test_bits_around_a_voxel_are_those_of_the_voxels_beside_it(
     mask = around(bits.ravel(), *bits.strides[:2], *at)
     beside = padded[tuple(slice(i - 1, i + 2) for i in at)]
     assert [bool(mask >> k & 1) for k in range(27)] == beside.ravel().tolist()
+
+
+@given(masks(side=9), rngs())
+@settings(max_examples=60)
+def test_squared_distances_along_voxels_are_those_of_the_whole_map(
+    blocked: Bools, rng: np.random.Generator
+) -> None:
+    cells = np.column_stack([rng.integers(0, side, 12) for side in blocked.shape])
+    expected = squared_distances_3d(blocked, NOWHERE)[tuple(cells.T)]
+    np.testing.assert_array_equal(squared_along(blocked, cells, NOWHERE), expected)
