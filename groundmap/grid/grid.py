@@ -23,7 +23,7 @@ from groundmap.grid.fusion import Average, UpdateRule
 from groundmap.grid.grid_files import GridContent, read_grid, write_grid
 from groundmap.grid.height_layers import SIGHT_HEIGHTS, HeightLayers, as_heights
 from groundmap.grid.tiles import Index, Tile, Tiles
-from groundmap.grid.window import CellState, GridWindow, cells_of
+from groundmap.grid.window import CellBox, CellState, GridWindow, cells_of
 
 MOST_CELLS = 2**28  # of a dense window: 2 GiB
 
@@ -147,10 +147,8 @@ class ConfidenceGrid:
         """
         check_whole(self._tiles, most_cells, self.origin, self.resolution)
 
-    def window(
-        self, bounds: npt.ArrayLike | None = None, *, most_cells: int = MOST_CELLS
-    ) -> GridWindow:
-        """Return the cells of a box as dense arrays.
+    def box(self, bounds: npt.ArrayLike | None = None, *, most_cells: int = MOST_CELLS) -> CellBox:
+        """Return where the cells of a box lie.
 
         Parameters
         ----------
@@ -174,14 +172,33 @@ class ConfidenceGrid:
         else:
             lower, upper = cells_of_box(bounds, self.origin, self.resolution)
             check_size(lower, upper, most_cells, self.resolution)
-        dense = self._tiles.read(lower, upper)
-        self._layers.raise_confidence(dense.confidence, lower, upper)
-        return GridWindow(
-            dense.confidence,
-            dense.count,
-            origin=self.origin + lower[::-1] * self.resolution,
-            resolution=self.resolution,
-        )
+        corner = self.origin + lower[::-1] * self.resolution
+        return CellBox(lower, upper, corner, self.resolution)
+
+    def read(self, box: CellBox) -> GridWindow:
+        """Return the cells of a box as dense arrays; each takes 8 bytes."""
+        dense = self._tiles.read(box.lower, box.upper)
+        self._layers.raise_confidence(dense.confidence, box.lower, box.upper)
+        return GridWindow(dense.confidence, dense.count, box.origin, self.resolution)
+
+    def window(
+        self, bounds: npt.ArrayLike | None = None, *, most_cells: int = MOST_CELLS
+    ) -> GridWindow:
+        """Return the cells of a box as dense arrays.
+
+        Parameters
+        ----------
+        bounds : array_like, shape (2 d,), optional
+            As for `box`.
+        most_cells : int, default 2**28
+            Cells that the box may hold; each takes 8 bytes.
+
+        Raises
+        ------
+        InputError
+            As for `box`.
+        """
+        return self.read(self.box(bounds, most_cells=most_cells))
 
     def area(self, state: CellState) -> float:
         """Return the area of all cells in a state [m²]; on 3-D maps the volume [m³]."""

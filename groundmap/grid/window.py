@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -24,6 +25,7 @@ from groundmap.arrays import (
 from groundmap.errors import InputError
 
 EPSILON = 0.01  # |confidence| below this is contested
+SLAB_CELLS = 2**22  # 32 MiB of confidence and count
 
 
 class CellState(IntEnum):
@@ -35,9 +37,87 @@ class CellState(IntEnum):
     CONTESTED = 3  #: in between: views contradict each other
 
 
+class CellFrame:
+    """Where the cells of a box lie.
+
+    Attributes
+    ----------
+    origin : ndarray, shape (d,) [m, map]
+        Outer corner of cell (0, 0), x first.
+    resolution : float [m]
+    """
+
+    origin: Floats
+    resolution: float
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of cells along each axis, ``(rows, cols)``, ``(layers, rows, cols)`` in 3-D."""
+        raise NotImplementedError
+
+    def world_to_cell(self, xy: npt.ArrayLike) -> Ints:
+        """Return the cells ``[row, col]`` of map positions (x, y) [m], outside ones included."""
+        return cells_of(xy, self.origin, self.resolution)
+
+    def cell_to_world(self, cells: npt.ArrayLike) -> Floats:
+        """Return the centres (x, y) [m, map] of cells ``[row, col]``."""
+        return centres_of(cells, self.origin, self.resolution)
+
+    def contains(self, cells: Ints) -> Bools:
+        """Return which cells lie inside."""
+        within = (cells >= 0) & (cells < np.array(self.shape))
+        inside: Bools = np.logical_and.reduce(within, axis=-1)
+        return inside
+
+
 @dataclass(frozen=True, eq=False)
-class GridWindow:
-    """A dense window of a grid; arrays are indexed ``[row, col]`` (``[layer, row, col]`` in 3-D).
+class CellBox(CellFrame):
+    """A box of a grid's cells, without what the grid holds there.
+
+    Attributes
+    ----------
+    lower, upper : ndarray of int64, shape (d,)
+        The first cell ``[row, col]`` of the grid, and the cell past the last.
+    origin : ndarray, shape (d,) [m, map]
+        Outer corner of the first cell, x first.
+    resolution : float [m]
+
+    Examples
+    --------
+    >>> box = CellBox(np.array([-2, 0, 1]), np.array([3, 4, 5]), np.zeros(3), 0.5)
+    >>> box.shape, [(slab.shape, slab.origin.tolist()) for slab in box.slabs(40)]
+    ((5, 4, 4), [((2, 4, 4), [0.0, 0.0, 0.0]), ((2, 4, 4), [0.0, 0.0, 1.0]), \
+((1, 4, 4), [0.0, 0.0, 2.0])])
+    """
+
+    lower: Ints
+    upper: Ints
+    origin: Floats
+    resolution: float
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of cells along each axis."""
+        return tuple((self.upper - self.lower).tolist())
+
+    def slabs(self, most_cells: int = SLAB_CELLS) -> Iterator[CellBox]:
+        """Yield boxes of whole rows or layers that together are this one, in order.
+
+        Parameters
+        ----------
+        most_cells : int, default 2**22
+            Cells of a slab; one row or layer is never cut.
+        """
+        for part in slabs(self.shape, most_cells):
+            lower, upper, origin = self.lower.copy(), self.upper.copy(), self.origin.copy()
+            lower[0], upper[0] = self.lower[0] + part.start, self.lower[0] + part.stop
+            origin[-1] += part.start * self.resolution
+            yield CellBox(lower, upper, origin, self.resolution)
+
+
+@dataclass(frozen=True, eq=False)
+class GridWindow(CellFrame):
+    """A dense piece of a grid; arrays are indexed ``[row, col]`` (``[layer, row, col]`` in 3-D).
 
     Attributes
     ----------
@@ -55,6 +135,11 @@ class GridWindow:
     origin: Floats
     resolution: float
 
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of cells along each axis."""
+        return self.count.shape
+
     def states(self, *, epsilon: float = EPSILON) -> Bytes:
         """Return the `CellState` of every cell, as uint8.
 
@@ -71,19 +156,19 @@ class GridWindow:
         states[self.count == 0] = CellState.UNKNOWN
         return states
 
-    def world_to_cell(self, xy: npt.ArrayLike) -> Ints:
-        """Return the cells ``[row, col]`` of map positions (x, y) [m], inside or outside."""
-        return cells_of(xy, self.origin, self.resolution)
 
-    def cell_to_world(self, cells: npt.ArrayLike) -> Floats:
-        """Return the centres (x, y) [m, map] of cells ``[row, col]``."""
-        return centres_of(cells, self.origin, self.resolution)
+def slabs(shape: tuple[int, ...], most_cells: int = SLAB_CELLS) -> Iterator[slice]:
+    """Yield slices of the first axis that together are a box of cells, in order.
 
-    def contains(self, cells: Ints) -> Bools:
-        """Return which cells lie inside the window."""
-        within = (cells >= 0) & (cells < np.array(self.count.shape))
-        inside: Bools = np.logical_and.reduce(within, axis=-1)
-        return inside
+    Parameters
+    ----------
+    shape : tuple of int
+    most_cells : int, default 2**22
+        Cells of a slab; one row or layer is never cut.
+    """
+    thickness = max(1, most_cells // max(1, math.prod(shape[1:])))
+    for first in range(0, shape[0], thickness):
+        yield slice(first, min(first + thickness, shape[0]))
 
 
 def cells_of(xy: npt.ArrayLike, origin: Floats, resolution: float) -> Ints:
