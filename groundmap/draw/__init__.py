@@ -13,6 +13,7 @@ from groundmap.draw.maps import draw_grid, draw_trajectory, draw_verdicts, known
 from groundmap.draw.routes import draw_route, draw_routes
 from groundmap.draw.truth import draw_difference, draw_truth
 from groundmap.draw.views import draw_view
+from groundmap.draw.voxels import voxel_figure
 
 __all__ = [
     "check_picture",
@@ -32,4 +33,5 @@ __all__ = [
     "known_bounds",
     "new_figure",
     "save_figure",
+    "voxel_figure",
 ]

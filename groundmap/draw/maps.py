@@ -30,12 +30,13 @@ LABELS = {
     CellState.CONTESTED: "contested",
     CellState.UNKNOWN: "unknown",
 }
-MOST_DRAWN = 2**25  # cells of a picture, of about 50 bytes each; no screen shows more
+#: Cells of a picture by dimension. In 2-D, each takes about 50 bytes, and no screen shows more.
+MOST_DRAWN = {2: 2**25, 3: 2**27}
 TRAJECTORY = "#1f5f8b"
 
 
 def known_bounds(grid: ConfidenceGrid, *, margin: float = 1.0) -> Floats:
-    """Return the box around all observed cells, shape (4,) [m, map].
+    """Return the box around all observed cells, shape (4,), of a 3-D map (6,) [m, map].
 
     Parameters
     ----------
@@ -48,7 +49,7 @@ def known_bounds(grid: ConfidenceGrid, *, margin: float = 1.0) -> Floats:
     InputError
         The grid is empty, or its tiles lie too far apart for one picture.
     """
-    grid.check_extent(MOST_DRAWN)
+    grid.check_extent(MOST_DRAWN[grid.ndim])
     # Tile by tile, since a dense window would need memory for the whole bounding box.
     observed = (
         np.array(index) * grid.tile_shape + np.argwhere(tile.count) for index, tile in grid.tiles()
@@ -89,18 +90,40 @@ def draw_grid(
     InputError
         Invalid bounds, or bounds with more than 2**25 cells.
     """
-    from matplotlib.patches import Patch
-
     epsilon = as_number("epsilon", epsilon, "a number above 0", above=0.0)
     box = known_bounds(grid) if bounds is None else as_floats("bounds", bounds, (4,))
     ax = ax or new_figure(box)[1]
-    window = grid.window(box, most_cells=MOST_DRAWN)
+    return draw_states(grid.window(box, most_cells=MOST_DRAWN[2]), box, epsilon=epsilon, ax=ax)
+
+
+def draw_states(
+    window: GridWindow, box: Floats, *, epsilon: float = EPSILON, ax: Axes
+) -> list[Artist]:
+    """Draw the states of the cells of a window as `draw_grid` does.
+
+    Parameters
+    ----------
+    window : GridWindow
+        In 2-D.
+    box : ndarray, shape (4,) [m, map]
+        What the axes show.
+    epsilon : float
+        Confidence below which a cell is contested.
+    ax : matplotlib Axes
+
+    Raises
+    ------
+    InputError
+        A window without a cell.
+    """
+    from matplotlib.patches import Patch
+
     rows, cols = window.count.shape
     if rows * cols == 0:  # a float's step at these coordinates is larger than the box
         raise InputError("bounds", "a box that holds a cell", str(box.tolist()))
     x, y = window.origin
     picture = ax.imshow(
-        _shade(window, epsilon),
+        shade(window, epsilon=epsilon),
         origin="lower",
         extent=(x, x + cols * window.resolution, y, y + rows * window.resolution),
         interpolation="nearest",
@@ -179,7 +202,16 @@ def draw_verdicts(
     return artists
 
 
-def _shade(window: GridWindow, epsilon: float) -> Floats:
+def shade(window: GridWindow, *, epsilon: float = EPSILON) -> Floats:
+    """Return the colours of the states of a window, shape (rows, cols, 3).
+
+    Parameters
+    ----------
+    window : GridWindow
+        In 2-D.
+    epsilon : float
+        Confidence below which a cell is contested.
+    """
     states = window.states(epsilon=epsilon)
     certainty = np.abs(window.confidence).astype(np.float64)[..., None]
     image = np.zeros((*states.shape, 3))

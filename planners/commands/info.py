@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -29,7 +30,7 @@ def info_command(
     guess_visibility: GuessOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Summarise a map (areas [m²], bounds [m], update rule, poses), or a source of views."""
+    """Summarise a map (areas or voxels, bounds, memory, update rule, poses), or a source of views."""
     if format is None and path.suffix.lower() in LOADERS and not path.is_dir():
         emit(_describe_grid(path), as_json=as_json, title=f"map {path}")
         return
@@ -43,6 +44,14 @@ def _describe_grid(path: Path) -> dict[str, Any]:
     grid = load_map(path)
     poses = grid.trajectory
     extent, unit = ("area", "m2") if grid.ndim == 2 else ("volume", "m3")
+    cell = grid.resolution**grid.ndim
+    areas = {
+        state.name.lower(): grid.area(state)
+        for state in (CellState.FREE, CellState.NONFREE, CellState.CONTESTED)
+    }
+    voxels = {f"voxels_{name}": round(area / cell) for name, area in areas.items()}
+    lower, upper = grid.cell_bounds()
+    dense = {"voxels_in_bounds": math.prod((upper - lower).tolist())}
     return {
         "resolution": grid.resolution,
         "frame": grid.frame,
@@ -50,9 +59,8 @@ def _describe_grid(path: Path) -> dict[str, Any]:
         "bounds": grid.bounds().tolist(),
         "tiles": sum(1 for _ in grid.tiles()),
         "map_bytes": grid.nbytes,
-        f"{extent}_free_{unit}": grid.area(CellState.FREE),
-        f"{extent}_nonfree_{unit}": grid.area(CellState.NONFREE),
-        f"{extent}_contested_{unit}": grid.area(CellState.CONTESTED),
+        **{f"{extent}_{name}_{unit}": area for name, area in areas.items()},
+        **(voxels | dense if grid.ndim == 3 else {}),
         "poses": len(poses),
         "first_pose": poses[0].tolist() if len(poses) else None,
         "last_pose": poses[-1].tolist() if len(poses) else None,

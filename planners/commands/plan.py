@@ -23,7 +23,7 @@ from planners.commands.console import (
     show_waiting,
 )
 from planners.commands.options import assignments, outline
-from planners.commands.plot import check_flat, draw_map
+from planners.commands.plot import draw_map, draw_voxels
 from planners.errors import NoRouteError, ProblemError
 from planners.planning import plan
 from planners.problem.costs import CostSettings
@@ -168,7 +168,6 @@ def _load_map(map_file: Path, *, draws: bool) -> ConfidenceGrid:
     """Load a map; if it is to be drawn, refuse one that can't be before the search."""
     grid = load_map(map_file)
     if draws:
-        check_flat(grid, map_file)
         known_bounds(grid)  # raises for a map too large to draw
     return grid
 
@@ -183,6 +182,10 @@ def _shorten(
 
 
 def _draw(problem: PlanningProblem, route: Route, graph: Graph | None, plot: Path) -> None:
+    if problem.grid.ndim == 3:
+        routes = {"route": route.waypoints}
+        draw_voxels(problem.grid, plot, routes=routes, footprint=problem.radius)
+        return
     draw_map(
         problem.grid,
         plot,
@@ -212,7 +215,10 @@ def _compare(
         raise next((e for e in failures if isinstance(e, NoRouteError)), failures[0])
     if plot is not None:
         lines = {name: route.waypoints for name, route in routes.items()}
-        draw_map(problem.grid, plot, lines=lines)
+        if problem.grid.ndim == 3:
+            draw_voxels(problem.grid, plot, routes=lines, footprint=problem.radius)
+        else:
+            draw_map(problem.grid, plot, lines=lines)
     if as_json:
         by_name = {name: route.to_dict() for name, route in routes.items()}
         emit({"routes": by_name, "refused": refused}, as_json=True, title=title)

@@ -44,13 +44,23 @@ def plot_command(
     config: ConfigOption = None,
     bounds: Annotated[
         str | None,
-        typer.Option(metavar="XMIN,YMIN,XMAX,YMAX", help="Part to draw [m]; default: all."),
+        typer.Option(
+            metavar="XMIN,YMIN,XMAX,YMAX",
+            help="Part to draw [m]; default: all. On a 3-D map XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX.",
+        ),
     ] = None,
     route: Annotated[Path | None, typer.Option(help="Route to draw: GeoJSON of `plan`.")] = None,
     footprint: Annotated[float, typer.Option(help="Radius to draw along the route [m].")] = 0.0,
+    height: Annotated[
+        float | None,
+        typer.Option(help="On a 3-D map: z of the layer to draw [m]; default: from the route."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Draw a map (free, non-free, contested, unknown), its trajectory, and a route on it."""
+    """Draw a map (free, non-free, contested, unknown), its trajectory, and a route on it.
+
+    Of a 3-D map, draw its non-free surfaces, a layer, and a section along the route.
+    """
     picture = out or _beside(map_file)
     draw.check_picture(picture, sources=files_of(map_file))
     if explain is not None:
@@ -58,23 +68,32 @@ def plot_command(
         emit({"out": str(picture)}, as_json=as_json, title=f"view {explain} of {map_file}")
         return
     grid = load_map(map_file)
-    check_flat(grid, map_file)
-    box = None if bounds is None else np.array(numbers("bounds", bounds, 4))
-    waypoints = None if route is None else _read_route(route)
-    draw_map(grid, picture, bounds=box, waypoints=waypoints, footprint=footprint)
+    if height is not None and grid.ndim != 3:
+        raise InputError("height", "a 3-D map", f"one of {grid.ndim}-D")
+    box = None if bounds is None else np.array(numbers("bounds", bounds, 2 * grid.ndim))
+    waypoints = None if route is None else _read_route(route, grid.ndim)
+    if grid.ndim == 3:
+        routes = {} if waypoints is None else {"route": waypoints}
+        draw_voxels(grid, picture, bounds=box, height=height, routes=routes, footprint=footprint)
+    else:
+        draw_map(grid, picture, bounds=box, waypoints=waypoints, footprint=footprint)
     emit({"out": str(picture)}, as_json=as_json, title=f"picture of {map_file}")
 
 
-def check_flat(grid: ConfidenceGrid, map_file: Path) -> None:
-    """Check that a map can be drawn.
-
-    Raises
-    ------
-    InputError
-        A 3-D map.
-    """
-    if grid.ndim != 2:
-        raise InputError(str(map_file), "a 2-D map, to draw it", f"one of {grid.ndim}-D")
+def draw_voxels(
+    grid: ConfidenceGrid,
+    picture: Path,
+    *,
+    routes: Mapping[str, Floats],
+    bounds: Floats | None = None,
+    height: float | None = None,
+    footprint: float = 0.0,
+) -> None:
+    """Draw a 3-D map and routes on it to a file; see `groundmap.draw.voxel_figure`."""
+    figure = draw.voxel_figure(
+        grid, bounds=bounds, height=height, routes=routes, footprint=footprint
+    )
+    draw.save_figure(figure, picture)
 
 
 def draw_map(
@@ -130,12 +149,12 @@ def _draw_view(
     draw.save_figure(figure, out)
 
 
-def _read_route(path: Path) -> Floats:
-    """Return the line of a GeoJSON Feature, shape (n, 2) [m, map]."""
+def _read_route(path: Path, ndim: int) -> Floats:
+    """Return the line of a GeoJSON Feature, shape (n, ndim) [m, map]."""
     expected = "a GeoJSON Feature with a LineString"
     feature = read_json(path, "a GeoJSON file")
     try:
-        line = as_floats("coordinates", feature["geometry"]["coordinates"], (None, 2))
+        line = as_floats("coordinates", feature["geometry"]["coordinates"], (None, ndim))
         check_finite("coordinates", line)
     except InputError as error:
         raise FileFormatError(path, f"{expected} of {error.expected}", error.got) from error

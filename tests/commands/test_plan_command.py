@@ -152,8 +152,16 @@ def test_a_voxel_map_can_be_planned_on(tmp_path: Path) -> None:
         start="2.5,2.5,2.5",
         goal="9.5,2.5,9.5",
     )
-    assert picture.code == 2
-    assert "expected a 2-D map, to draw it, got one of 3-D" in picture.json["reason"]
+    assert picture.code == 0
+    assert (tmp_path / "route.png").read_bytes().startswith(b"\x89PNG")
+    drawn = run("plot", tmp_path / "box.3dmap", "--route", out, "--height", 7.5, "--json")
+    assert drawn.code == 0
+    assert (tmp_path / "box.png").read_bytes().startswith(b"\x89PNG")
+    outside = run("plot", tmp_path / "box.3dmap", "--height", 17, "--json")
+    assert "height: expected a z from 0 to 16 m, got 17" in outside.json["reason"]
+    described = run("info", tmp_path / "box.3dmap", "--json").json
+    assert (described["voxels_free"], described["voxels_nonfree"]) == (4095, 1)
+    assert (described["voxels_in_bounds"], described["volume_nonfree_m3"]) == (4096, 1.0)
     ran = plan(tmp_path / "box.3dmap", "--planner", "jps", start="2,2,2", goal="9,2,9")
     assert ran.code == 2
     assert "planner: expected one that supports 3-D maps: astar, auto" in ran.json["reason"]

@@ -11,6 +11,7 @@ from fuzz.calls import Call
 from fuzz.draw import Draw
 from fuzz.problems import footprint, grid
 from fuzz.values import array, number
+from groundmap import ConfidenceGrid
 from groundmap import draw as pictures
 
 LINE = np.array([[1.0, 1.0], [3.0, 1.0], [4.0, 3.0]])
@@ -54,8 +55,25 @@ def curves(draw: Draw, _folder: Path) -> None:
     pictures.draw_curves({"a": draw.noted("rows", array(draw, rows, 0.8))}, ax=axes)
 
 
+def voxels(draw: Draw, _folder: Path) -> None:
+    """Draw a 3-D map and a route on it."""
+    on = ConfidenceGrid(resolution=0.5, origin=(0, 0, 0))
+    z = draw.numpy.choice([-1.0, 0.0, 1.0], (8, 10, 12)).astype(np.float32)
+    on.fuse(np.zeros(3, dtype=np.int64), z)
+    line = np.column_stack([LINE, [1.0, 2.0, 1.0]])
+    options: dict[str, Any] = {
+        "bounds": array(draw, np.array([0, 0, 0, 6, 5, 4.0]), 0.3),
+        "height": number(draw, 0.0, 4.0, 0.2),
+        "routes": {"route": array(draw, line, 0.3)},
+        "footprint": number(draw, 0.0, 1.0, 0.2),
+    }
+    chosen = {name: value for name, value in options.items() if draw.chance(0.6)}
+    pictures.voxel_figure(on, **draw.noted("options", chosen))
+
+
 DRAW_CALLS: tuple[Call, ...] = (
     Call("draw-map", maps, weight=0.3),
     Call("draw-lines", lines, weight=0.3),
     Call("draw-curves", curves, weight=0.1),
+    Call("draw-voxels", voxels, weight=0.05),
 )
