@@ -114,6 +114,9 @@ def _line(name: str, points: npt.ArrayLike) -> Floats:
     check_finite(f"route {name}", line)
     if not len(line):
         raise InputError(f"route {name}", "one or more points x, y, z [m]", "0")
+    farthest = float(np.abs(line).max())
+    if farthest > LARGEST_BOX:
+        raise InputError(f"route {name}", f"points within {LARGEST_BOX:g} m", f"{farthest:g} m")
     return line
 
 

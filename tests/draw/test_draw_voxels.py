@@ -100,6 +100,7 @@ def test_the_layer_is_where_most_is_in_the_way_of_the_route() -> None:
         ({"height": 5.0}, "height: expected a z from 0 to 4 m, got 5"),
         ({"footprint": -1.0}, "footprint: expected a radius of 0 or more"),
         ({"routes": {"a": [(0, 0)]}}, "route a: expected"),
+        ({"routes": {"a": [(0, 0, 1e155)]}}, "route a: expected points within 1e\\+12 m"),
         ({"routes": {"a": np.empty((0, 3))}}, "route a: expected one or more points x, y, z"),
     ],
 )
