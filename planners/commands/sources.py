@@ -21,6 +21,10 @@ EXAMPLE_HEIGHT = 1.4  # [m], of a camera, in the sentence that explains --scale
 MOST_TILT = np.radians(5.0)  # of the ground of a log that is not levelled
 LOW, HIGH = 0.05, 0.95  # quantiles of the heights of the cameras
 
+SourceArgument = Annotated[
+    Path,
+    typer.Argument(help="Folder with a log of views, or the map of a SLAM or SfM system."),
+]
 FormatOption = Annotated[
     str | None,
     typer.Option(help="Format of the source; default: detected from the contents of its files."),
@@ -151,7 +155,12 @@ class Source:
                 "the unit of the source is unknown, and was taken for a metre: give --scale, "
                 "--scale-points or --camera-height"
             )
-        if self.normals and not self.views.similarity.tilt:
+        if self.views.levelled and self.views.ground is None:
+            found.append(
+                "no ground was found under the track: the world was levelled by the mean attitude "
+                "of the cameras"
+            )
+        if self.normals and not self.views.levelled:
             mean = np.mean(self.normals, axis=0)
             tilt = float(np.arccos(np.clip(mean[2] / np.linalg.norm(mean), -1.0, 1.0)))
             if tilt > MOST_TILT:
