@@ -14,7 +14,7 @@ from groundmap.evidence.ground_plane.kernels.raster import (
     lowest_sight,
     roll_over,
 )
-from groundmap.evidence.ground_plane.missing_ground import missing_ground
+from groundmap.evidence.ground_plane.missing_ground import missing_ground, on_slopes
 from groundmap.evidence.ground_plane.surfaces import SurfaceKind, Surfaces
 from groundmap.evidence.ground_plane.visibility import NO_SURFACE, SightFan
 from groundmap.evidence.uncertainty import MODELS
@@ -131,9 +131,11 @@ def with_drop_offs(evidence: Evidence, ground_view: GroundView, grid: Confidence
 
     Ground is missing under such features, and where their lines of sight pass between the
     ground's level and the feature: had there been ground, it would have been in the way. There, z
-    is raised to how sure they are.
+    is raised to how sure they are. Features that a gentle slope leads down to say nothing.
     """
     deep = (ground_view.drop_off_sureness > 0) & ~_alone(ground_view.drop_offs)
+    if deep.any():
+        deep &= ~on_slopes(ground_view)
     if not deep.any():
         return evidence
     ground_view = ground_view._replace(
