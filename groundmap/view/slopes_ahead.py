@@ -17,9 +17,9 @@ SHARE = 0.6  # of the features on a piece that are ground there; those of a bush
 AROUND = 1.0  # [m], distance from the ground of features that count against it
 STEEP = 0.1  # slope from which on a piece is several levels high
 BREAKS = 2  # pieces between the places that are tried for a change of slope
-SLOPES = np.tan(np.radians(np.arange(-14.0, 15.0)))
+SLOPES: Floats = np.tan(np.radians(np.arange(-14.0, 15.0)))
 LEAST_RUN = 4  # pieces between two changes of slope
-STEPS = np.arange(-20, 21) * LEVEL  # [m], heights of steps, which are not slopes
+STEPS: Floats = np.arange(-20, 21) * LEVEL  # [m], heights of steps, which are not slopes
 NEAREST = 0.01  # [m], between two places of a strip
 GAIN = 4.0  # pieces of ground that a change of slope must explain beyond a step or level ground
 MOST_CHANGES = 3
@@ -162,5 +162,4 @@ def _best_change(
 def _best_step(counts: _Counts) -> float:
     """Return how many pieces are ground with a step at any place, of any height."""
     after = np.arange(len(counts.at)) >= np.arange(0, len(counts.at), BREAKS)[:, None]
-    heights: Floats = STEPS[:, None, None] * after
-    return float(counts.ground(heights, 0.0).sum(axis=2).max())
+    return float(counts.ground(STEPS[:, None, None] * after, 0.0).sum(axis=2).max())
