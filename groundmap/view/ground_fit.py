@@ -25,7 +25,7 @@ from groundmap.view.view import View
 
 REACH = 3.0  # [max_range], horizontal distance from the camera within which features are used
 NOISE_FLOOR = 0.03  # [m], deviation of a real road from a plane
-SIDE = 0.03  # [m/m], how much the ground may be off per distance from the driven track
+SIDE = 0.05  # [m/m], how much the ground may be off per distance from the driven track
 SIGMA_SLOPE = 0.003  # of a long track against the ground under the wheels
 SIGMA_RISE = 0.05  # [m], the same over the length of a short one
 LONG = 3.0  # [m], track from which on it says more about the ground than its continuation
