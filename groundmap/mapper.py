@@ -21,7 +21,7 @@ from groundmap.grid.grid import ConfidenceGrid
 from groundmap.settings import MapperSettings
 from groundmap.stopwatch import Stopwatch
 from groundmap.view.frames import map_from_world
-from groundmap.view.ground_plane import GroundPlane
+from groundmap.view.ground_fit import fit_ground
 from groundmap.view.stereo_rig import StereoRig
 from groundmap.view.view import View
 
@@ -163,7 +163,7 @@ def _pose2d(view: View) -> Floats:
 
 
 def warm_up(settings: MapperSettings) -> None:
-    """Compile the kernels of `GroundMapper.integrate`, or load them from the cache."""
+    """Compile the kernels of `fit_ground` and `GroundMapper`, or load them from the cache."""
     rig = StereoRig(fx=700.0, fy=700.0, cx=320.0, cy=240.0, baseline=0.5)
     ground, obstacle = (320.0, 250.0, 450.0), (420.0, 350.0, 240.0)
     view = View.from_pixels(
@@ -173,4 +173,5 @@ def warm_up(settings: MapperSettings) -> None:
         segments_px=[[(250.0, 180.0, 240.0), (300.0, 230.0, 260.0)]],
     )
     mapper = GroundMapper(**settings.model_dump())
-    mapper.integrate(view.with_plane(GroundPlane.below_camera(rig, 1.5)))
+    for grounded in fit_ground([view], camera_height=1.5):
+        mapper.integrate(grounded)

@@ -3,6 +3,7 @@
 from groundmap.simulate.drive import Drive, DriveSettings, drive
 from groundmap.simulate.landmarks import Landmarks, sample_landmarks
 from groundmap.simulate.observe import observe
+from groundmap.simulate.relief import Relief
 from groundmap.simulate.sensor import SensorSettings
 from groundmap.simulate.world import Hole, Solid, World
 
@@ -11,6 +12,7 @@ __all__ = [
     "DriveSettings",
     "Hole",
     "Landmarks",
+    "Relief",
     "SensorSettings",
     "Solid",
     "World",

@@ -11,6 +11,7 @@ from pydantic import Field
 from groundmap.arrays import Floats, as_floats, check_finite
 from groundmap.errors import InputError
 from groundmap.settings import Settings
+from groundmap.simulate.relief import Relief
 from groundmap.simulate.world import FARTHEST
 
 MOST_VIEWS = 100_000  # of a drive; more indicates a wrong unit
@@ -48,6 +49,10 @@ class Drive(NamedTuple):
     true: Floats
     logged: Floats  #: as logged, with noise and drift
     times: Floats  #: shape (n,) [s]
+
+    def lifted(self, relief: Relief) -> Drive:
+        """Return the drive over a relief instead of flat ground."""
+        return Drive(relief.lift_poses(self.true), relief.lift_poses(self.logged), self.times)
 
 
 def drive(settings: DriveSettings, rng: np.random.Generator) -> Drive:

@@ -91,7 +91,7 @@ class _Scene:
         ids = np.flatnonzero(length > 1)
         ends = np.stack([start[ids], start[ids] + length[ids] - 1], axis=1)
         visible = places[ids[:, None], ends]
-        pixels, _ = self.settings.project(self.pose, visible.reshape(-1, 3))
+        pixels, _ = self.settings.project(self.pose, self._lift(visible.reshape(-1, 3)))
         return _Seen(pixels.reshape(-1, 2, 3), ids)
 
     def periods(self, seen: _Seen, marks: LandmarkSet) -> Floats:
@@ -111,11 +111,22 @@ class _Scene:
 
     def _look(self, places: Floats, present: Bools) -> tuple[Floats, Bools]:
         """Return the pixels of places, and which of them are visible in both images."""
-        pixels, seen = self.settings.project(self.pose, places)
+        lifted = self._lift(places)
+        pixels, seen = self.settings.project(self.pose, lifted)
         rows = np.flatnonzero(seen & present)
         seen[:] = False
-        seen[rows] = in_sight(self.now, self.eye, places[rows])
+        eye, relief = self.eye.copy(), self.world.relief
+        if relief is not None:
+            # Landmarks in a hole are behind its mouth, which `in_sight` checks.
+            sunk = np.maximum(-places[rows, 2:], 0.0) * (0.0, 0.0, 1.0)
+            rows = rows[relief.in_sight(eye, lifted[rows] + sunk)]
+            eye[2] -= relief.height(eye[:2])
+        seen[rows] = in_sight(self.now, eye, places[rows])
         return pixels, seen
+
+    def _lift(self, places: Floats) -> Floats:
+        """Raise places over flat ground, shape (n, 3) [m, map], to the relief of the world."""
+        return places if self.world.relief is None else self.world.relief.lift(places)
 
 
 def _some_of(seen: _Seen, most: int, rng: np.random.Generator) -> _Seen:

@@ -1,4 +1,4 @@
-"""Simulated worlds: prisms on a flat ground, each present for some time."""
+"""Simulated worlds: prisms on the ground, each present for some time."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from shapely.affinity import translate
 
 from groundmap.arrays import Floats, as_floats, as_number, check_finite
 from groundmap.errors import InputError
+from groundmap.simulate.relief import Relief
 
 FARTHEST = 1e8  # [m] from the origin to an outline; beyond, edges of centimetres are rounded away
 THINNEST = 1e-9  # [m] between two sides; less is rounding, and faces would have no direction
@@ -161,7 +162,9 @@ class Hole:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class World:
-    """Solids and holes on a flat ground at height 0.
+    """Solids and holes on the ground: flat at height 0, or with a relief.
+
+    Heights of solids and holes are above the ground below them.
 
     Parameters
     ----------
@@ -173,6 +176,7 @@ class World:
         Point features on the ground.
     ground_lines : float, default 0 [1/m²]
         Segment features on the ground, such as paint.
+    relief : Relief, optional
 
     Raises
     ------
@@ -194,6 +198,7 @@ class World:
     holes: tuple[Hole, ...] = ()
     ground_texture: float = 6.0
     ground_lines: float = 0.0
+    relief: Relief | None = None
 
     def __post_init__(self) -> None:
         """Check the bounds and the densities."""

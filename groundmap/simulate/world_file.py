@@ -1,4 +1,4 @@
-"""Settings of the solids and holes in scenario files, a table each."""
+"""Settings of solids, holes and the relief in scenario files, a table each."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pydantic import Field
 
 from groundmap.errors import InputError
 from groundmap.settings import Settings
+from groundmap.simulate.relief import FLAT, Relief
 from groundmap.simulate.shapes import box, pole, polygon, table, wall
 from groundmap.simulate.world import Hole, Solid
 
@@ -100,3 +101,17 @@ class HoleSettings(_Shaped):
         """Return the hole."""
         given = getattr(self, way := self._pick_given("box", "polygon"))
         return Hole(box(*given) if way == "box" else polygon(given), depth=self.depth)
+
+
+class ReliefSettings(Settings):
+    """The relief of the ground; see `groundmap.simulate.Relief`."""
+
+    road: tuple[Point, ...] = Field(description="centre line of a road [m]")
+    along: tuple[Point, ...] = Field((FLAT,), description="distance along the road, height [m]")
+    across: tuple[Point, ...] = Field(
+        (FLAT,), description="distance to the left of the road, height above the road [m]"
+    )
+
+    def relief(self) -> Relief:
+        """Return the relief."""
+        return Relief(road=self.road, along=self.along, across=self.across)

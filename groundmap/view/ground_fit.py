@@ -1,10 +1,11 @@
-"""Ground fitting: one plane per view, fitted to a window of views."""
+"""Ground fitting: the ground under each view, fitted to a window of views along the track."""
 
 from __future__ import annotations
 
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Iterable, Iterator
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -13,27 +14,28 @@ from groundmap.errors import InputError, NoGroundPlaneError
 from groundmap.settings import GroundSettings
 from groundmap.view.camera_check import check_plane
 from groundmap.view.diagnosis import describe_dropped, likely_mistakes, upright_views
+from groundmap.view.driven_track import Track, level_axes
 from groundmap.view.frames import invert
 from groundmap.view.ground_plane import TILT_FLOOR, GroundPlane
-from groundmap.view.stereo_rig import StereoRig
-from groundmap.view.view import View, sigma_along
+from groundmap.view.ground_strip import EVEN, STRAIGHT, GroundStrip
+from groundmap.view.ground_windows import Window, windows
+from groundmap.view.plane_fit import Cloud, fit_plane
+from groundmap.view.slopes_ahead import continue_strip, slopes_ahead
+from groundmap.view.view import View
 
 REACH = 3.0  # [max_range], horizontal distance from the camera within which features are used
 NOISE_FLOOR = 0.03  # [m], deviation of a real road from a plane
-TILTS = np.stack(
-    np.meshgrid(
-        np.tan(np.radians(np.arange(-10.0, 11.0, 2.0))), np.tan(np.radians((-6, -3, 0, 3, 6)))
-    ),
-    axis=-1,
-).reshape(-1, 2)
+SIDE = 0.05  # [m/m], how much the ground may be off per distance from the driven track
+SIGMA_SLOPE = 0.003  # of a long track against the ground under the wheels
+SIGMA_RISE = 0.05  # [m], the same over the length of a short one
+LONG = 3.0  # [m], track from which on it says more about the ground than its continuation
+SHORTEST = 1e-3  # [m], length of a track
+BENT = np.radians(4.0)  # change of slope; below it, a track above the ground is as good
 SIGMA_TILT_OF_BASE = 0.02  # [rad], tilt of base_link against the ground
-BIN = 0.1  # [m], height bins of the Hough transform
-TOLERANCES = (0.4, 0.3, 0.2, 0.15, 0.15, 0.15)  # [m], one per refinement step
 GROUND_HINT = (
     "give the height of the camera above the ground (camera_height=..., --camera-height), or "
     "T_base_camera in the rig, so that the ground is known from base_link."
 )
-WORST_CONDITION = 1e12  # of the information matrix; above it, all features are on one line
 
 
 def fit_ground(
@@ -43,11 +45,14 @@ def fit_ground(
     camera_height: float | None = None,
     **settings: Any,
 ) -> Iterator[View]:
-    """Return views with a ground plane each, lazily and in their order.
+    """Return views with the ground under each, lazily and in their order.
 
-    The plane of a view is fitted to the features of a window of views, because planes fitted to
+    The ground of a view is fitted to the features of a window of views, because planes fitted to
     single views vary by degrees. The window is centred on the view; with ``causal=True`` it ends
-    with the view. At most one window of views is held in memory.
+    with the view. The poses of the drive show where the ground rises and falls along the driven
+    track; the features show how far it is below the cameras, and where its slope changes ahead of
+    the track. Features near the track count most. Views are read ahead for half a window and for
+    the next `max_range` metres of the track, at most 200.
 
     Where a window has too few features on a plane, its view gets the plane of the view before,
     with ``support=0``. Before the first fitted plane, a mounted rig (`T_base_camera` is given)
@@ -60,7 +65,8 @@ def fit_ground(
     plane : GroundPlane, optional
         Use this plane for all views instead of fitting planes.
     camera_height : float, optional [m]
-        Use level ground this far below the left camera instead of fitting planes.
+        Use ground this far below the left camera along the driven track, instead of fitting it to
+        features. Where the robot has not moved, the ground is level with its base.
     **settings
         Fields of `groundmap.GroundSettings`: ``window`` [views], ``causal``, ``max_range`` [m], ...
 
@@ -93,30 +99,37 @@ def fit_ground(
         camera_height = as_number("camera_height", camera_height, expected, above=0.0)
     if plane is not None and camera_height is not None:
         raise InputError("fit_ground", "plane or camera_height", "both")
-    if plane is not None or camera_height is not None:
-        return _with_given_plane(views, plane, camera_height, options)
+    if plane is not None:
+        return _with_given_plane(views, plane, options)
+    if camera_height is not None:
+        return _with_given_height(views, camera_height, options)
     return _with_fitted_plane(views, options)
 
 
 def _with_fitted_plane(views: Iterable[View], options: GroundSettings) -> Iterator[View]:
     last: GroundPlane | None = None
-    for number, (view, window) in enumerate(_windows(views, options)):
-        last = _fit(view, window, options) or last
+    for number, window in enumerate(windows(views, options)):
+        last = _fit(window, options) or last
         if last is None:
-            last = _ground_of_base(view, window, options)
-        yield _attach_plane(view, last, number)
-        last = GroundPlane(normal=last.normal, offset=last.offset, sigma_tilt=last.sigma_tilt)
+            last = _ground_of_base(window, options)
+        yield _attach_plane(window.view, last, number)
+        last = replace(last, support=0, strip=None)
 
 
 def _with_given_plane(
-    views: Iterable[View],
-    plane: GroundPlane | None,
-    camera_height: float | None,
-    options: GroundSettings,
+    views: Iterable[View], plane: GroundPlane, options: GroundSettings
 ) -> Iterator[View]:
     for number, view in upright_views(views, causal=options.causal):
-        below = plane or GroundPlane.below_camera(view.rig, camera_height or 0.0)
-        yield _attach_plane(view, below, number)
+        yield _attach_plane(view, plane, number)
+
+
+def _with_given_height(
+    views: Iterable[View], camera_height: float, options: GroundSettings
+) -> Iterator[View]:
+    for number, window in enumerate(windows(views, options)):
+        level = GroundPlane.below_camera(window.view.rig, camera_height)
+        track = window.track(options, below_camera=camera_height)
+        yield _attach_plane(window.view, _along(track.strip, window.view, level), number)
 
 
 def _attach_plane(view: View, plane: GroundPlane, number: int) -> View:
@@ -126,176 +139,135 @@ def _attach_plane(view: View, plane: GroundPlane, number: int) -> View:
     return with_plane
 
 
-class _NearFeatures(NamedTuple):
-    """A view and its features within range."""
+def _fit(window: Window, options: GroundSettings) -> GroundPlane | None:
+    """Return the ground under a view, or None if too few features lie on it.
 
-    view: View
-    points: Floats  # (n, 3) [m, map]
-    sigmas: Floats  # (n,) [m], standard deviation of the height
-
-
-def _select_near(view: View, options: GroundSettings) -> _NearFeatures:
-    segments = view.segments
-    xyz = np.concatenate([view.points.xyz, segments.xyz.reshape(-1, 3)])
-    covariance = np.concatenate([view.points.covariance, segments.covariance.reshape(-1, 3, 3)])
-    near = np.hypot(xyz[:, 0], xyz[:, 2]) <= options.max_range
-    T_map_camera = view.T_map_camera
-    points = xyz[near] @ T_map_camera[:3, :3].T + T_map_camera[:3, 3]
-    up = T_map_camera[2, :3]
-    return _NearFeatures(view, points, sigma_along(up, covariance[near]))
-
-
-def _windows(
-    views: Iterable[View], options: GroundSettings
-) -> Iterator[tuple[View, list[_NearFeatures]]]:
-    """Yield each view with the views around it (or before it), holding one window at a time."""
-    ahead = 0 if options.causal else options.window // 2
-    behind = options.window - 1 - ahead
-    window: deque[_NearFeatures] = deque()
-    current = 0  # index in `window` of the next view to yield
-    source = upright_views(views, causal=options.causal)
-    for latest in _pad_with_none((_select_near(view, options) for _, view in source), times=ahead):
-        if latest is not None:
-            window.append(latest)
-        if current < len(window) and (latest is None or len(window) - current > ahead):
-            yield window[current].view, list(window)
-            current += 1
-            if current > behind:
-                window.popleft()
-                current -= 1
-
-
-def _pad_with_none(items: Iterable[_NearFeatures], *, times: int) -> Iterator[_NearFeatures | None]:
-    """Yield the items, then None: the windows of the last views are shorter."""
-    yield from items
-    for _ in range(times):
-        yield None
-
-
-class _Cloud(NamedTuple):
-    """Features of a window that may be ground, relative to the camera, level with the base."""
-
-    points: Floats  # (n, 3) [m], forward, left and up of the camera
-    sigmas: Floats  # (n,) [m]
-    weights: Floats  # (n,) [1/m²]
-
-
-def _fit(view: View, window: list[_NearFeatures], options: GroundSettings) -> GroundPlane | None:
-    """Return the plane under a view, or None if too few features lie on one.
-
-    The camera is between ``lowest_camera`` and ``highest_camera`` above it.
+    The camera is between ``lowest_camera`` and ``highest_camera`` above it. A bare camera hangs at
+    an unknown height over the track, which the first fit determines.
     """
-    cloud = _cloud(view, window, options)
-    if len(cloud.points) < options.min_support:
-        return None
-    plane = _search(cloud.points, np.sqrt(cloud.weights), options)
-    if plane is None:
-        return None
-    for tolerance in TOLERANCES:
-        refined = _refine(cloud, plane, tolerance, options.min_support)
-        if refined is None:
-            return None
-        plane, information, support = refined
-    a, b, c = plane
-    up = np.array([-a, -b, 1.0]) / np.sqrt(a * a + b * b + 1.0)
-    normal = _level_axes(view.rig).T @ up
-    normal /= np.linalg.norm(normal)
-    tilt = np.sqrt(np.diag(np.linalg.inv(information))[:2].sum())
-    camera_height = -c * up[2]
-    # The features are below the camera, but their plane, extended to the camera, may be above it.
-    if not options.lowest_camera <= camera_height <= options.highest_camera:
-        return None
-    return GroundPlane(
-        normal=normal,
-        offset=float(camera_height - normal @ view.rig.T_base_camera[:3, 3]),
-        sigma_tilt=float(np.hypot(tilt, TILT_FLOOR)),
-        support=support,
+    rig = window.view.rig
+    below = float(rig.up @ rig.T_base_camera[:3, 3]) if rig.is_mounted else 0.0
+    plane = _fit_along(window, below, options)
+    if plane is None or rig.is_mounted or not _is_bent(plane):
+        return plane
+    height = float(plane.height(rig.T_base_camera[:3, 3]))
+    return _fit_along(window, height, options)
+
+
+def _is_bent(plane: GroundPlane) -> bool:
+    """Return whether slopes change so much that the height of the track above the ground counts."""
+    return plane.strip is not None and bool(
+        (plane.strip.normals @ plane.normal).min() < np.cos(BENT)
     )
 
 
-def _cloud(view: View, window: list[_NearFeatures], options: GroundSettings) -> _Cloud:
+def _fit_along(window: Window, below: float, options: GroundSettings) -> GroundPlane | None:
+    """Return the ground along the track that runs `below` [m] under the cameras."""
+    view = window.view
+    track = window.track(options, below_camera=below)
+    sigma_slope = float(np.hypot(SIGMA_SLOPE, SIGMA_RISE / max(track.length, SHORTEST)))
+    if view.rig.is_mounted:
+        sigma_slope = min(sigma_slope, SIGMA_TILT_OF_BASE)
+    points, sigmas = _along_track(window, track, below, options)
+    trust = 1.0 if view.rig.is_mounted else track.length / (track.length + LONG)
+    fitted = fit_plane(_cloud(points, sigmas, track, trust, options), sigma_slope, options)
+    if fitted is None:
+        return None
+    a, b, c = fitted.plane
+    camera_height = -c / np.sqrt(a * a + b * b + 1.0)
+    # The features are below the camera, but their plane, extended to the camera, may be above it.
+    if not options.lowest_camera <= camera_height <= options.highest_camera:
+        return None
+    normal = level_axes(view.rig).T @ (np.array([-a, -b, 1.0]) / np.sqrt(a * a + b * b + 1.0))
+    normal /= np.linalg.norm(normal)
+    level = GroundPlane(
+        normal=normal,
+        offset=float(camera_height - normal @ view.rig.T_base_camera[:3, 3]),
+        sigma_tilt=float(np.hypot(fitted.sigma_tilt, TILT_FLOOR)),
+        support=fitted.support,
+    )
+    if track.beyond >= options.max_range:
+        return _along(track.raised(a, b, c + below), view, level)
+    above = points - np.outer(a * points[:, 0] + b * points[:, 1] + c, (0.0, 0.0, 1.0))
+    changes = slopes_ahead(above - (track.beyond, 0.0, 0.0), options.max_range)
+    strip = continue_strip(track.raised(a, b, c + below), track.undriven, changes)
+    return _along(strip, view, level)
+
+
+def _along(strip: GroundStrip, view: View, level: GroundPlane) -> GroundPlane:
+    """Return the ground of a strip [level]: `level`, if the strip is nowhere off this plane."""
+    rig = view.rig
+    in_base = strip.transformed(level_axes(rig).T, rig.T_base_camera[:3, 3]).simplified()
+    sunk = np.abs(level.height(in_base.places)).max()
+    turned = np.abs(in_base.normals - level.normal).max()
+    if sunk < STRAIGHT and turned < EVEN:
+        return level
+    camera = rig.T_base_camera[:3, 3]
+    normal = in_base.normal_at(camera)
+    return replace(
+        level,
+        normal=normal,
+        offset=float(in_base.height(camera) - normal @ camera),
+        strip=in_base if len(in_base.places) > 2 else None,
+    )
+
+
+def _along_track(
+    window: Window, track: Track, below: float, options: GroundSettings
+) -> tuple[Floats, Floats]:
+    """Return features of a window relative to its view and the track, and their deviations.
+
+    Shape (n, 3) [m], along the track, to its left, and above the camera, which the track runs
+    `below`; and the standard deviations of the heights, shape (n,) [m].
+    """
+    view = window.view
     T_base_map = invert(view.T_map_base)
-    points = np.concatenate([features.points for features in window]) @ T_base_map[:3, :3].T
+    points = np.concatenate([held.near.points for held in window.held]) @ T_base_map[:3, :3].T
     points += T_base_map[:3, 3] - view.rig.T_base_camera[:3, 3]
-    level = points @ _level_axes(view.rig).T
-    low = (-options.highest_camera < level[:, 2]) & (level[:, 2] < -options.lowest_camera)
+    level = points @ level_axes(view.rig).T
+    sigmas = np.concatenate([held.near.sigmas for held in window.held])
     # After a jump of the poses, the views before it are of another place.
-    low &= np.hypot(level[:, 0], level[:, 1]) <= REACH * options.max_range
-    sigmas = np.concatenate([features.sigmas for features in window])[low]
-    return _Cloud(level[low], sigmas, 1.0 / (sigmas**2 + NOISE_FLOOR**2))
+    around = np.hypot(level[:, 0], level[:, 1]) <= REACH * options.max_range
+    station, offset, height = track.strip.locate(level[around])
+    return np.stack([station - track.station, offset, height - below], axis=1), sigmas[around]
 
 
-def _refine(
-    cloud: _Cloud, plane: Floats, tolerance: float, min_support: int
-) -> tuple[Floats, Floats, int] | None:
-    """Return a refined plane (a, b, c: up = a forward + b left + c), its information and support.
+def _cloud(
+    points: Floats, sigmas: Floats, track: Track, trust: float, options: GroundSettings
+) -> Cloud:
+    """Return the features that may be ground, the surer the nearer to the driven track.
 
-    One step of iteratively reweighted least squares with Tukey's biweight. None if fewer than
-    `min_support` features lie on the plane, or all of them lie on one line.
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3) [m]
+    sigmas : ndarray, shape (n,) [m]
+    track : Track
+    trust : float
+        From 0 to 1, how much better the slope of the track is known than that ahead of it.
+    options : GroundSettings
     """
-    x, y, z = cloud.points.T
-    design = np.column_stack([x, y, np.ones(len(x))])
-    residual = z - design @ plane
-    scale = np.sqrt(tolerance**2 + (2 * cloud.sigmas) ** 2)
-    weights = cloud.weights * np.maximum(0.0, 1.0 - (residual / scale) ** 2) ** 2
-    support = int((weights > 0).sum())
-    information = (design * weights[:, None]).T @ design
-    if support < min_support or np.linalg.cond(information) > WORST_CONDITION:
-        return None
-    return np.linalg.solve(information, design.T @ (weights * z)), information, support
+    low = (-options.highest_camera < points[:, 2]) & (points[:, 2] < -options.lowest_camera)
+    points, sigmas = points[low], sigmas[low]
+    undriven = np.maximum(points[:, 0] - track.beyond, -track.before - points[:, 0])
+    undriven = trust * np.maximum(undriven, 0.0)
+    variance = sigmas**2 + NOISE_FLOOR**2 + (SIDE * points[:, 1]) ** 2
+    far = (SIDE * undriven) ** 2
+    votes = 1.0 / np.sqrt(variance) / (1.0 + far / NOISE_FLOOR**2)
+    return Cloud(points, sigmas, 1.0 / (variance + far), votes)
 
 
-def _search(points: Floats, weights: Floats, options: GroundSettings) -> Floats | None:
-    """Return the plane (a, b, c) that has most features on it and few below it.
-
-    A deterministic Hough transform over pitch, roll and height. None if no candidate is between
-    ``lowest_camera`` and ``highest_camera`` below the camera.
-    """
-    bins = np.floor((points[:, 2] - TILTS @ points[:, :2].T) / BIN).astype(np.int64)
-    lowest = int(bins.min())
-    columns = int(bins.max()) - lowest + 1
-    rows = np.arange(len(TILTS))[:, None] * columns
-    votes = np.bincount(
-        (bins - lowest + rows).ravel(),
-        weights=np.broadcast_to(weights, bins.shape).ravel(),
-        minlength=len(TILTS) * columns,
-    ).reshape(len(TILTS), columns)
-    # Votes of a bin and both neighbours count for a plane, those below it against it, by half.
-    padded = np.pad(votes, ((0, 0), (2, 1)))
-    near = votes + padded[:, 1:-2] + padded[:, 3:]
-    below = np.cumsum(padded, axis=1)[:, :columns]
-    intercepts = (lowest + np.arange(columns) + 0.5) * BIN
-    camera_heights = -intercepts / np.sqrt(1.0 + (TILTS**2).sum(axis=1))[:, None]
-    allowed = (camera_heights >= options.lowest_camera) & (camera_heights <= options.highest_camera)
-    if not allowed.any():
-        return None
-    score = np.where(allowed, near - 0.5 * below, -np.inf)
-    tilt, column = np.unravel_index(int(np.argmax(score)), votes.shape)
-    return np.array([*TILTS[tilt], intercepts[column]])
-
-
-def _level_axes(rig: StereoRig) -> Floats:
-    """Return axes with up of the base and forward of the camera, rows forward, left and up."""
-    up = rig.up
-    axis = rig.T_base_camera[:3, 2]
-    forward = axis - (axis @ up) * up
-    forward /= np.linalg.norm(forward)
-    return np.stack([forward, np.cross(up, forward), up])
-
-
-def _ground_of_base(
-    view: View, window: list[_NearFeatures], options: GroundSettings
-) -> GroundPlane:
+def _ground_of_base(window: Window, options: GroundSettings) -> GroundPlane:
     """Return level ground through the origin of ``base_link``, for a mounted rig."""
+    view = window.view
     if view.rig.is_mounted:
         return GroundPlane(normal=view.rig.up, offset=0.0, sigma_tilt=SIGMA_TILT_OF_BASE)
-    views = [features.view for features in window]
-    count = sum(len(features.points) for features in window)
+    views = [held.view for held in window.held]
+    count = sum(len(held.near.points) for held in window.held)
     dropped = sum((view.dropped for view in views), Counter[str]())
     dropped["out_of_range"] = sum(_count_positions(view) for view in views) - count
     raise NoGroundPlaneError(
         f"no plane between {options.lowest_camera:g} and {options.highest_camera:g} m below the "
-        f"camera contains enough of the {count} features of {len(window)} views"
+        f"camera contains enough of the {count} features of {len(views)} views"
         f"{f' (dropped: {describe_dropped(+dropped)})' if dropped.total() else ''}: "
         + (" ".join(likely_mistakes(views)) or GROUND_HINT)
     )

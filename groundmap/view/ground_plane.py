@@ -1,4 +1,4 @@
-"""The ground plane of one view."""
+"""The ground of one view: a plane, or a strip of planes along the driven track."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from groundmap.arrays import Floats, as_floats, as_number, check_finite, is_number
 from groundmap.errors import InputError
+from groundmap.view.ground_strip import GroundStrip
 from groundmap.view.stereo_rig import StereoRig
 
 TILT_FLOOR = 0.005  # [rad], a road is not a perfect plane, however many features it has
@@ -16,6 +17,9 @@ TILT_FLOOR = 0.005  # [rad], a road is not a perfect plane, however many feature
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GroundPlane:
     """The ground under one view: a plane in the ``base_link`` frame, which moves with the pose.
+
+    Where the driven track shows that the ground is not one plane, the plane is that at the camera,
+    and `strip` has the others.
 
     Parameters
     ----------
@@ -28,6 +32,8 @@ class GroundPlane:
     support : int, default 0
         Number of ground features that the plane was fitted to; 0 for a plane that was given, or
         taken over from an earlier view.
+    strip : GroundStrip, optional [base_link]
+        The ground along the track; then, `normal` and `offset` are those at the camera.
 
     Raises
     ------
@@ -45,6 +51,7 @@ class GroundPlane:
     offset: float
     sigma_tilt: float = TILT_FLOOR
     support: int = 0
+    strip: GroundStrip | None = None
 
     def __post_init__(self) -> None:
         normal = as_floats("normal", self.normal, (3,))
@@ -84,7 +91,9 @@ class GroundPlane:
         return cls(normal=rig.up, offset=offset)
 
     def height(self, points: Floats) -> Floats:
-        """Return the heights [m] above the plane of points, shape (..., 3) [m, base_link]."""
+        """Return the heights [m] above the ground of points, shape (..., 3) [m, base_link]."""
+        if self.strip is not None:
+            return self.strip.height(points)
         x, y, z = np.moveaxis(np.asarray(points, dtype=np.float64), -1, 0)
         normal = self.normal
         heights: Floats = normal[0] * x + normal[1] * y + normal[2] * z + self.offset

@@ -15,7 +15,7 @@ from groundmap.settings import GroundSettings, MapperSettings, Settings
 from groundmap.simulate.drive import DriveSettings
 from groundmap.simulate.scan import ScanSettings
 from groundmap.simulate.sensor import SensorSettings
-from groundmap.simulate.world_file import HoleSettings, SolidSettings
+from groundmap.simulate.world_file import HoleSettings, ReliefSettings, SolidSettings
 from groundmap.simulate.worlds import GENERATORS, WorldGenerator
 from planners.scenario.outcome import Bound
 from planners.scenario.queries import QuerySettings, bound_from, check_query, check_stated_once
@@ -42,6 +42,7 @@ class Scenario:
     world: WorldGenerator | None
     solids: tuple[SolidSettings, ...]
     holes: tuple[HoleSettings, ...]
+    relief: ReliefSettings | None
     sensor: SensorSettings
     scan: ScanSettings | None
     drive: DriveSettings | None
@@ -118,6 +119,14 @@ def _scenario(path: Path, content: dict[str, Any]) -> Scenario:
     world = dict(head.world or {})
     solids = tuple(SolidSettings(**table) for table in _tables(world, "solids"))
     holes = tuple(HoleSettings(**table) for table in _tables(world, "holes"))
+    relief = world.pop("relief", None)
+    if relief is not None:
+        if not isinstance(relief, dict):
+            raise InputError("world.relief", "a [world.relief] table", repr(relief))
+        relief = ReliefSettings(**relief)
+        relief.relief()
+        if head.scan is not None:
+            raise FileFormatError(path, "flat ground with [scan]", "[world.relief]")
     for solid in solids:  # an invalid shape raises here, before the scenario runs
         solid.solids()
     for hole in holes:
@@ -141,6 +150,7 @@ def _scenario(path: Path, content: dict[str, Any]) -> Scenario:
         world=None if head.world is None else _generator(world, path.parent),
         solids=solids,
         holes=holes,
+        relief=relief,
         sensor=SensorSettings(**head.sensor),
         scan=None if head.scan is None else ScanSettings(**head.scan),
         drive=None if head.drive is None else DriveSettings(**head.drive),

@@ -33,6 +33,8 @@ def simulate(scenario: Scenario) -> Simulated:
     world = build_world(scenario)
     assert scenario.drive is not None
     moves = drive(scenario.drive, np.random.default_rng((scenario.seed, 1)))
+    if world.relief is not None:
+        moves = moves.lifted(world.relief)
     mapper = GroundMapper(**scenario.mapper.model_dump())
     height = scenario.sensor.camera_height if scenario.level_ground else None
     views = views_of(scenario, world, moves)
@@ -44,12 +46,17 @@ def simulate(scenario: Scenario) -> Simulated:
 
 
 def build_world(scenario: Scenario) -> World:
-    """Return the world of a scenario: that of its generator with the listed solids and holes."""
+    """Return the world of a scenario: that of its generator with the listed parts."""
     assert scenario.world is not None
     world = scenario.world.make(np.random.default_rng((scenario.seed, 0)))
     solids = [solid for settings in scenario.solids for solid in settings.solids()]
     holes = [settings.hole() for settings in scenario.holes]
-    return replace(world, solids=(*world.solids, *solids), holes=(*world.holes, *holes))
+    return replace(
+        world,
+        solids=(*world.solids, *solids),
+        holes=(*world.holes, *holes),
+        relief=scenario.relief.relief() if scenario.relief else None,
+    )
 
 
 def views_of(scenario: Scenario, world: World, moves: Drive) -> Iterable[View]:

@@ -178,18 +178,34 @@ def test_a_plane_is_fitted_to_as_many_views_as_the_window_has(window: int, causa
     assert not causal or used[-1] == middle
 
 
-@pytest.mark.parametrize(("causal", "ahead"), [(True, 0), (False, 3)])
-def test_views_are_read_no_more_than_half_a_window_ahead(causal: bool, ahead: int) -> None:
+@pytest.mark.parametrize(
+    ("causal", "max_range", "ahead"), [(True, 20.0, 0), (False, 1.5, 3), (False, 6.5, 7)]
+)
+def test_views_are_read_for_half_a_window_or_the_track_in_range_ahead(
+    causal: bool, max_range: float, ahead: int
+) -> None:
     read = []
 
     def source() -> Iterator[View]:
-        for number, view in enumerate(drive(n_views=12, n_features=60)):
+        for number, view in enumerate(drive(n_views=12, n_features=60)):  # a metre apart
             read.append(number)
             yield view
 
-    for number, _ in enumerate(fit_ground(source(), window=7, causal=causal)):
-        assert len(read) <= min(number + 1 + ahead, 12)
-    assert len(read) == 12
+    views = fit_ground(source(), window=7, causal=causal, max_range=max_range, camera_height=1.6)
+    for number, _ in enumerate(views):
+        assert len(read) == min(number + 1 + ahead, 12)
+
+
+def test_no_more_than_200_views_are_read_ahead_of_a_robot_at_rest() -> None:
+    read = []
+
+    def source() -> Iterator[View]:
+        for number in range(300):
+            read.append(number)
+            yield View(T_map_base=pose_at(0.0), rig=mounted_rig())
+
+    next(fit_ground(source(), camera_height=1.2))
+    assert len(read) == 201
 
 
 def test_nothing_is_read_before_the_first_view_is_requested() -> None:

@@ -162,8 +162,12 @@ def _measure(
     xy = np.stack([row[0] * x + row[1] * y + row[2] * z for row in axes], axis=-1)
     radius = np.hypot(xy[..., 0], xy[..., 1])
     up = view.rig.T_base_camera[:3, :3].T @ plane.normal
-    height = up[0] * x + up[1] * y + up[2] * z
-    height += float(plane.height(view.rig.T_base_camera[:3, 3]))
+    if plane.strip is None:
+        height = up[0] * x + up[1] * y + up[2] * z
+        height += float(plane.height(view.rig.T_base_camera[:3, 3]))
+    else:
+        T_base_camera = view.rig.T_base_camera
+        height = plane.height(features.xyz @ T_base_camera[:3, :3].T + T_base_camera[:3, 3])
     sigma = sigma_along(up, features.covariance)
     tolerance = np.maximum(settings.step_height, 2.0 * sigma + radius * plane.sigma_tilt)
     # Both ends of a segment get its number.

@@ -6,10 +6,31 @@ import numpy as np
 
 from groundmap.arrays import Bools, Floats, Ints
 from groundmap.evidence.ground_plane.height_classes import GroundView
-from groundmap.evidence.ground_plane.kernels.lines import features_beside
+from groundmap.evidence.ground_plane.kernels.lines import climb_down, features_beside
 
 DEEPEST_SIGHT = 3.0  # [m], along the ground; features that lie deeper are mostly false matches
 BESIDE = 0.15  # [m], distance up to which a ground feature is beside a line of sight
+ACROSS = 0.2  # [m], from the line of sight to a feature before it on the same slope
+LONGEST = 1.5  # [m], between two features on a slope
+STEEPEST = 0.25  # drop per distance, 14 degrees: ground that is no step
+SLACK = 0.03  # [m], error of the heights
+
+
+def on_slopes(ground_view: GroundView) -> Bools:
+    """Return which `drop_offs` a gentle slope leads down to: a verge, or a hill, shape (b,).
+
+    Behind the edge of a step, ground is hidden; on a slope, features lie one behind the other.
+    """
+    places = np.concatenate([ground_view.supports, ground_view.drop_offs])
+    heights = np.concatenate([ground_view.support_heights, ground_view.drop_off_heights])
+    radius = np.hypot(places[:, 0], places[:, 1])
+    order = np.argsort(radius, kind="stable")
+    below, reached = order >= len(ground_view.supports), np.empty(len(order), dtype=np.bool_)
+    lines = (radius[order], places[order], heights[order], below)
+    climb_down(*lines, ACROSS, LONGEST, STEEPEST, SLACK, reached)
+    sloping = np.empty(len(order), dtype=np.bool_)
+    sloping[order] = reached
+    return sloping[len(ground_view.supports) :]
 
 
 def missing_ground(ground_view: GroundView, step: float) -> tuple[Floats, Ints]:

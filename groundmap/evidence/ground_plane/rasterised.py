@@ -14,7 +14,7 @@ from groundmap.evidence.ground_plane.kernels.raster import (
     lowest_sight,
     roll_over,
 )
-from groundmap.evidence.ground_plane.missing_ground import missing_ground
+from groundmap.evidence.ground_plane.missing_ground import missing_ground, on_slopes
 from groundmap.evidence.ground_plane.surfaces import SurfaceKind, Surfaces
 from groundmap.evidence.ground_plane.visibility import NO_SURFACE, SightFan
 from groundmap.evidence.uncertainty import MODELS
@@ -139,7 +139,7 @@ def with_drop_offs(evidence: Evidence, ground_view: GroundView, grid: Confidence
 
     Ground is missing at features below the ground, and where their lines of sight run below ground
     level, as ground would block them. The z of these cells is raised to the confidence of the
-    drop-off.
+    drop-off. Features that a gentle slope leads down to are left out.
 
     Parameters
     ----------
@@ -149,6 +149,8 @@ def with_drop_offs(evidence: Evidence, ground_view: GroundView, grid: Confidence
         Grid that defines the cells.
     """
     deep = (ground_view.drop_off_sureness > 0) & ~_alone(ground_view.drop_offs)
+    if deep.any():
+        deep &= ~on_slopes(ground_view)
     if not deep.any():
         return evidence
     ground_view = ground_view._replace(

@@ -150,3 +150,57 @@ def gap_chords(
         stack[top] = j
         top += 1
     return chords[:size], ends[:size]
+
+
+@njit(cache=True, nogil=True)
+def climb_down(
+    radius: Floats,
+    places: Floats,
+    heights: Floats,
+    below: Bools,
+    across: float,
+    longest: float,
+    steepest: float,
+    slack: float,
+    reached: Bools,
+) -> None:
+    """Mark features below the ground that a gentle slope leads down to.
+
+    A slope leads from feature to feature, away from the camera, from one that is ground.
+
+    Parameters
+    ----------
+    radius : ndarray, shape (n,) [m]
+        Ascending distances of the features from the camera.
+    places : ndarray, shape (n, 2) [m, view]
+    heights : ndarray, shape (n,) [m]
+    below : ndarray of bool, shape (n,)
+        Features below the ground; the others are ground.
+    across : float [m]
+        Largest distance of a feature from the line of sight to the next one.
+    longest : float [m]
+        Largest distance between the two along that line.
+    steepest : float
+        Largest drop per distance along the line.
+    slack : float [m]
+        What a drop may be larger by.
+    reached : ndarray of bool, shape (n,)
+        Set; False for features that are ground.
+    """
+    reached[:] = False
+    for row in range(len(radius)):
+        if not below[row]:
+            continue
+        x, y = places[row] / radius[row]
+        for other in range(row - 1, -1, -1):
+            if radius[other] < radius[row] - longest - across:
+                break
+            if below[other] and not reached[other]:
+                continue
+            gap = radius[row] - (x * places[other, 0] + y * places[other, 1])
+            side = abs(x * places[other, 1] - y * places[other, 0])
+            if side > across or gap <= 0 or gap > longest:
+                continue
+            if heights[other] - heights[row] <= steepest * gap + slack:
+                reached[row] = True
+                break
