@@ -77,6 +77,11 @@ def windows(views: Iterable[View], options: GroundSettings) -> Iterator[Window]:
     """Yield each view with its window and the poses of the drive around it.
 
     Views are read ahead for half a window, and for the poses of the next `max_range` metres.
+
+    Parameters
+    ----------
+    views : iterable of View
+    options : GroundSettings
     """
     ahead = 0 if options.causal else options.window // 2
     behind = options.window - 1 - ahead

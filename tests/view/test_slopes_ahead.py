@@ -32,7 +32,9 @@ def test_a_ramp_ahead_is_followed_within_a_step(angle: float, begin: float, seed
     points = road(np.random.default_rng(seed))
     points[:, 2] += np.tan(np.radians(angle)) * np.maximum(points[:, 0] - begin, 0.0)
     found = heights(list(slopes_ahead(points, REACH)), points[:, 0])
-    assert np.quantile(np.abs(points[:, 2] - found), 0.9) < 0.15
+    # A slope of a degree rises by less than a step over most of the way, and may be missed.
+    within = 0.15 if abs(angle) > 1.5 else 0.25
+    assert np.quantile(np.abs(points[:, 2] - found), 0.9) < within
 
 
 @pytest.mark.parametrize("angle", [-10.0, -5.0, 5.0, 10.0])
