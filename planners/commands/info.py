@@ -30,7 +30,7 @@ def info_command(
     guess_visibility: GuessOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Summarise a map (areas or voxels, bounds, memory, update rule, poses), or a source of views."""
+    """Summarise a map (areas [m²] or voxels, bounds [m], rule, poses), or a source of views."""
     if format is None and path.suffix.lower() in LOADERS and not path.is_dir():
         emit(_describe_grid(path), as_json=as_json, title=f"map {path}")
         return
