@@ -154,10 +154,10 @@ def test_a_voxel_map_can_be_planned_on(tmp_path: Path) -> None:
     )
     assert picture.code == 0
     assert (tmp_path / "route.png").read_bytes().startswith(b"\x89PNG")
-    drawn = run("plot", tmp_path / "box.3dmap", "--route", out, "--height", 7.5, "--json")
+    drawn = run("plot", tmp_path / "box.3dmap", "--route", out, "--height", "7.5", "--json")
     assert drawn.code == 0
     assert (tmp_path / "box.png").read_bytes().startswith(b"\x89PNG")
-    outside = run("plot", tmp_path / "box.3dmap", "--height", 17, "--json")
+    outside = run("plot", tmp_path / "box.3dmap", "--height", "17", "--json")
     assert "height: expected a z from 0 to 16 m, got 17" in outside.json["reason"]
     described = run("info", tmp_path / "box.3dmap", "--json").json
     assert (described["voxels_free"], described["voxels_nonfree"]) == (4095, 1)
