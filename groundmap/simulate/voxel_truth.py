@@ -27,19 +27,42 @@ class VoxelTruth(KnownMap):
 
     Attributes
     ----------
-    solids : tuple of Solid
-        Obstacles: the solids at the end of the drive, at rest.
+    world : World
+        At the end of the drive, at rest. Its solids are the obstacles.
     """
 
-    solids: tuple[Solid, ...]
+    world: World
 
     def to_obstacles(self, points: Floats) -> Floats:
         """Return the distance of points to the nearest solid [m]; 0 inside, inf without solids."""
-        return np.maximum(_distances(self.solids, points), 0.0)
+        return np.maximum(_distances(self.world.solids, points), 0.0)
+
+    def clearances(self, line: Floats) -> Floats:
+        """Return the distance of a line to each solid, and to the ground below it, shape (k,) [m].
+
+        It is that of places on the line at most a centimetre apart.
+        """
+        along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
+        stops = np.union1d(along, np.arange(0.0, along[-1], 0.01))
+        places = np.column_stack([np.interp(stops, along, axis) for axis in line.T])
+        solids = [_distances((solid,), places).min() for solid in self.world.solids]
+        open_ground = places[~self._over_holes(places)]
+        ground = [open_ground[:, 2].min()] if len(open_ground) else []
+        distances: Floats = np.maximum(np.array(solids + ground), 0.0)
+        return distances
+
+    def nonfree_on(self, box: CellFrame) -> Bools:
+        """Return which voxels of another box overlap a solid or the ground."""
+        return touched_voxels(self.world, box)
 
     def to_borders(self, points: Floats) -> Floats:
         """Return the distance of points to the surface of the nearest solid [m]."""
-        return np.abs(_distances(self.solids, points))
+        return np.abs(_distances(self.world.solids, points))
+
+    def _over_holes(self, places: Floats) -> Bools:
+        holes = shapely.union_all([hole.outline for hole in self.world.holes])
+        over: Bools = shapely.intersects_xy(holes, places[:, :2])
+        return over
 
 
 def voxel_truth_of(
@@ -93,7 +116,7 @@ def voxel_truth_of(
         in_line=in_line.reshape(box.shape),
         surfaces=samples[seen],
         viewpoints=eyes,
-        solids=at_end.solids,
+        world=at_end,
     )
 
 
