@@ -101,12 +101,15 @@ def voxel_truth_of(
     eyes = (moves.true @ sensor.rig.T_base_camera)[:, :3, 3]
     for pose, eye, time in zip(moves.true, eyes, moves.times, strict=True):
         now = world.at(float(time))
-        ahead = _in_images(centres, pose, eye, sensor, settings.max_range)
-        _look(now, eye, centres, ahead, visible)
+        reach = settings.max_range
+        rows = _in_images(centres, np.flatnonzero(~visible), pose, sensor, reach)
+        visible[rows] = in_sight(now, eye, centres[rows])
         in_line |= visible
-        _look(now, eye, centres, np.ones_like(in_line), in_line)
-        ahead = _in_images(samples, pose, eye, sensor, settings.max_range)
-        _look(now, eye, samples, ahead & _still_there(samples, now), seen)
+        rows = np.flatnonzero(~in_line)
+        in_line[rows] = in_sight(now, eye, centres[rows])
+        rows = _in_images(samples, np.flatnonzero(~seen), pose, sensor, reach)
+        rows = rows[_still_there(samples[rows], now)]
+        seen[rows] = in_sight(now, eye, samples[rows])
     xmin, ymin, xmax, ymax = world.bounds
     x, y = centres[:, :2].T
     visible &= (xmin <= x) & (x <= xmax) & (ymin <= y) & (y <= ymax)
@@ -161,18 +164,13 @@ def _highest(solid: Solid, origin: Floats, resolution: float, shape: tuple[int, 
 
 
 def _in_images(
-    places: Floats, pose: Floats, eye: Floats, sensor: SensorSettings, reach: float
-) -> Bools:
-    """Return which places are in both images and in range."""
-    _, inside = sensor.project(pose, places)
-    inside &= np.hypot(*(places[:, :2] - eye[:2]).T) <= reach
-    return inside
-
-
-def _look(now: World, eye: Floats, places: Floats, ahead: Bools, seen: Bools) -> None:
-    """Set which places, among those ahead, are in sight; those seen before are not tested again."""
-    rows: Ints = np.flatnonzero(ahead & ~seen)
-    seen[rows] = in_sight(now, eye, places[rows])
+    places: Floats, rows: Ints, pose: Floats, sensor: SensorSettings, reach: float
+) -> Ints:
+    """Return which of some rows are places in both images and in range."""
+    eye = (pose @ sensor.rig.T_base_camera)[:2, 3]
+    rows = rows[np.hypot(*(places[rows, :2] - eye).T) <= reach]
+    _, inside = sensor.project(pose, places[rows])
+    return rows[inside]
 
 
 def _still_there(samples: Floats, now: World) -> Bools:
