@@ -135,6 +135,7 @@ def _draw_surfaces(grid: ConfidenceGrid, box: Floats, ax: Any) -> None:
         ax.set(**{f"{name}lim": (box[k], box[k + 3]), f"{name}label": f"{name} [m]"})
     ax.set_box_aspect(box[3:] - box[:3], zoom=0.88)  # the labels are outside
     ax.view_init(**SEEN_FROM)
+    ax.locator_params(axis="z", nbins=4)
     shown = "non-free surfaces" + (f", in cubes of {side:.3g} m" if side > grid.resolution else "")
     ax.set_title(shown, fontsize=10)
 

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 from groundmap.arrays import Bools, Floats
+from groundmap.grid.window import CellFrame
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +39,14 @@ class KnownMap(ABC):
 
         It is infinite without obstacles.
         """
+
+    @abstractmethod
+    def clearances(self, line: Floats) -> Floats:
+        """Return the distance of a line, shape (n, d) [m], to each obstacle, shape (k,) [m]."""
+
+    @abstractmethod
+    def nonfree_on(self, box: CellFrame) -> Bools:
+        """Return which cells of another box overlap an obstacle, shape of the box."""
 
     @abstractmethod
     def to_borders(self, points: Floats) -> Floats:

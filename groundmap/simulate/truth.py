@@ -9,7 +9,7 @@ import shapely
 from scipy.ndimage import binary_dilation
 
 from groundmap.arrays import Bools, Floats
-from groundmap.grid.window import GridWindow, cells_of, centres_of
+from groundmap.grid.window import CellFrame, GridWindow, cells_of, centres_of
 from groundmap.settings import MapperSettings
 from groundmap.simulate.drive import Drive
 from groundmap.simulate.known_map import KnownMap
@@ -44,6 +44,16 @@ class Truth(KnownMap):
     def to_obstacles(self, points: Floats) -> Floats:
         """Return the distance of points to the nearest obstacle [m]; 0 inside, inf without any."""
         return _distances(points, self.obstacles)
+
+    def clearances(self, line: Floats) -> Floats:
+        """Return the distance of a line to each part of the obstacles, shape (k,) [m]."""
+        parts = shapely.get_parts(self.obstacles)
+        distances: Floats = shapely.distance(shapely.LineString(line), parts)
+        return distances
+
+    def nonfree_on(self, box: CellFrame) -> Bools:
+        """Return which cells of another box overlap an obstacle, shape (rows, cols)."""
+        return touched_cells(self.obstacles, box.origin, box.resolution, box.shape)
 
     def to_borders(self, points: Floats) -> Floats:
         """Return the distance of points to the nearest outline of an obstacle [m]."""

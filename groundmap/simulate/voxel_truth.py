@@ -27,19 +27,42 @@ class VoxelTruth(KnownMap):
 
     Attributes
     ----------
-    solids : tuple of Solid
-        Obstacles: the solids at the end of the drive, at rest.
+    world : World
+        At the end of the drive, at rest. Its solids are the obstacles.
     """
 
-    solids: tuple[Solid, ...]
+    world: World
 
     def to_obstacles(self, points: Floats) -> Floats:
         """Return the distance of points to the nearest solid [m]; 0 inside, inf without solids."""
-        return np.maximum(_distances(self.solids, points), 0.0)
+        return np.maximum(_distances(self.world.solids, points), 0.0)
+
+    def clearances(self, line: Floats) -> Floats:
+        """Return the distance of a line to each solid, and to the ground below it, shape (k,) [m].
+
+        It is that of places on the line at most a centimetre apart.
+        """
+        along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
+        stops = np.union1d(along, np.arange(0.0, along[-1], 0.01))
+        places = np.column_stack([np.interp(stops, along, axis) for axis in line.T])
+        solids = [_distances((solid,), places).min() for solid in self.world.solids]
+        open_ground = places[~self._over_holes(places)]
+        ground = [open_ground[:, 2].min()] if len(open_ground) else []
+        distances: Floats = np.maximum(np.array(solids + ground), 0.0)
+        return distances
+
+    def nonfree_on(self, box: CellFrame) -> Bools:
+        """Return which voxels of another box overlap a solid or the ground."""
+        return touched_voxels(self.world, box)
 
     def to_borders(self, points: Floats) -> Floats:
         """Return the distance of points to the surface of the nearest solid [m]."""
-        return np.abs(_distances(self.solids, points))
+        return np.abs(_distances(self.world.solids, points))
+
+    def _over_holes(self, places: Floats) -> Bools:
+        holes = shapely.union_all([hole.outline for hole in self.world.holes])
+        over: Bools = shapely.intersects_xy(holes, places[:, :2])
+        return over
 
 
 def voxel_truth_of(
@@ -78,12 +101,15 @@ def voxel_truth_of(
     eyes = (moves.true @ sensor.rig.T_base_camera)[:, :3, 3]
     for pose, eye, time in zip(moves.true, eyes, moves.times, strict=True):
         now = world.at(float(time))
-        ahead = _in_images(centres, pose, eye, sensor, settings.max_range)
-        _look(now, eye, centres, ahead, visible)
+        reach = settings.max_range
+        rows = _in_images(centres, np.flatnonzero(~visible), pose, sensor, reach)
+        visible[rows] = in_sight(now, eye, centres[rows])
         in_line |= visible
-        _look(now, eye, centres, np.ones_like(in_line), in_line)
-        ahead = _in_images(samples, pose, eye, sensor, settings.max_range)
-        _look(now, eye, samples, ahead & _still_there(samples, now), seen)
+        rows = np.flatnonzero(~in_line)
+        in_line[rows] = in_sight(now, eye, centres[rows])
+        rows = _in_images(samples, np.flatnonzero(~seen), pose, sensor, reach)
+        rows = rows[_still_there(samples[rows], now)]
+        seen[rows] = in_sight(now, eye, samples[rows])
     xmin, ymin, xmax, ymax = world.bounds
     x, y = centres[:, :2].T
     visible &= (xmin <= x) & (x <= xmax) & (ymin <= y) & (y <= ymax)
@@ -93,7 +119,7 @@ def voxel_truth_of(
         in_line=in_line.reshape(box.shape),
         surfaces=samples[seen],
         viewpoints=eyes,
-        solids=at_end.solids,
+        world=at_end,
     )
 
 
@@ -138,18 +164,13 @@ def _highest(solid: Solid, origin: Floats, resolution: float, shape: tuple[int, 
 
 
 def _in_images(
-    places: Floats, pose: Floats, eye: Floats, sensor: SensorSettings, reach: float
-) -> Bools:
-    """Return which places are in both images and in range."""
-    _, inside = sensor.project(pose, places)
-    inside &= np.hypot(*(places[:, :2] - eye[:2]).T) <= reach
-    return inside
-
-
-def _look(now: World, eye: Floats, places: Floats, ahead: Bools, seen: Bools) -> None:
-    """Set which places, among those ahead, are in sight; those seen before are not tested again."""
-    rows: Ints = np.flatnonzero(ahead & ~seen)
-    seen[rows] = in_sight(now, eye, places[rows])
+    places: Floats, rows: Ints, pose: Floats, sensor: SensorSettings, reach: float
+) -> Ints:
+    """Return which of some rows are places in both images and in range."""
+    eye = (pose @ sensor.rig.T_base_camera)[:2, 3]
+    rows = rows[np.hypot(*(places[rows, :2] - eye).T) <= reach]
+    _, inside = sensor.project(pose, places[rows])
+    return rows[inside]
 
 
 def _still_there(samples: Floats, now: World) -> Bools:

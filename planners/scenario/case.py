@@ -38,6 +38,8 @@ class Scenario:
     why: str  #: purpose of the scenario
     seed: int
     level_ground: bool  #: whether the true ground plane is given, instead of fitted
+    flies: bool  #: whether views have no ground plane
+    heights: tuple[float, float]  #: lowest and highest z at which a 3-D map is measured [m]
     log: Path | None
     world: WorldGenerator | None
     solids: tuple[SolidSettings, ...]
@@ -98,6 +100,12 @@ class ScenarioSettings(Settings):
     level_ground: bool = Field(
         False, description="use the true, level ground planes instead of fitted ones"
     )
+    flies: bool = Field(
+        False, description="whether the robot flies, so that views have no ground plane: in 3-D"
+    )
+    heights: tuple[float, float] = Field(
+        (0.15, 2.0), description="lowest and highest z at which a 3-D map is measured [m]"
+    )
     world: dict[str, Any] | None = None
     log: dict[str, Any] | None = None
     sensor: dict[str, Any] = Field(default_factory=dict)
@@ -146,6 +154,8 @@ def _scenario(path: Path, content: dict[str, Any]) -> Scenario:
         why=" ".join(head.why.split()),
         seed=head.seed,
         level_ground=head.level_ground,
+        flies=head.flies,
+        heights=head.heights,
         log=None if head.log is None else path.parent / LogSettings(**head.log).path,
         world=None if head.world is None else _generator(world, path.parent),
         solids=solids,

@@ -41,8 +41,12 @@ class QuerySettings(Settings):
     """A query, its expected outcome and its bounds."""
 
     name: str = Field(description="prefix of the names of its figures")
-    start: tuple[float, ...] = Field(description="x, y [m, map] and optionally yaw [rad]")
-    goal: tuple[float, ...] = Field(description="x, y [m, map] and optionally yaw [rad]")
+    start: tuple[float, ...] = Field(
+        description="x, y, on a 3-D map z [m, map], and optionally yaw [rad]"
+    )
+    goal: tuple[float, ...] = Field(
+        description="x, y, on a 3-D map z [m, map], and optionally yaw [rad]"
+    )
     footprint: float | tuple[tuple[float, float], ...] = Field(
         description="footprint to plan with: a radius [m], or corners [m, base_link]"
     )

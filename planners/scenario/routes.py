@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-import shapely
 
 from groundmap import ConfidenceGrid
 from groundmap.arrays import Floats
 from groundmap.errors import InputError
-from groundmap.simulate.truth import touched_cells
+from groundmap.grid.window import CellBox
 from planners.errors import PlanningError
+from planners.geometry.polyline import length_of
 from planners.planning import plan
 from planners.problem.problem import PlanningProblem
 from planners.scenario.outcome import REASON, Figure
@@ -19,6 +19,7 @@ from planners.scenario.queries import OUTCOME, QuerySettings
 from planners.scenario.simulated import Simulated
 
 FINE = 0.05  # [m], side of a cell in the map of the true world
+ABOVE = 1.0  # [m] above all solids, in which routes of a flying robot may pass
 MOST_CELLS = 5e7  # in the map of the true world
 # Changes to a query for the best route in the true world.
 IN_TRUTH: dict[str, Any] = {
@@ -35,7 +36,7 @@ class QueryOutcome(NamedTuple):
     query: QuerySettings
     outcome: str  #: "route", or the name of the error
     reason: str  #: message of the error
-    waypoints: Floats | None  #: shape (n, 2) [m, map]
+    waypoints: Floats | None  #: shape (n, 2), on a 3-D map (n, 3) [m, map]
     figures: dict[str, Figure]
 
 
@@ -86,8 +87,7 @@ def compare_with_truth(
         return answer
     query = answer.query
     radius = query.radius if query.robot_radius is None else query.robot_radius
-    line = shapely.LineString(answer.waypoints)
-    distances = shapely.distance(line, shapely.get_parts(simulated.truth.obstacles))
+    distances = simulated.truth.clearances(answer.waypoints)
     best = run_query(query.model_copy(update={"footprint": radius, **IN_TRUTH}), fine)
     optimum = best.figures.get("length")
     figures: dict[str, Figure] = {
@@ -98,25 +98,29 @@ def compare_with_truth(
         "ratio": None,
     }
     if isinstance(optimum, float) and optimum > 0:
-        figures["ratio"] = float(shapely.length(line)) / optimum
+        figures["ratio"] = length_of(answer.waypoints) / optimum
     return answer._replace(figures=figures)
 
 
 def true_map(simulated: Simulated) -> ConfidenceGrid:
     """Return a map of the true world with fine cells: free, except for obstacles."""
     window = simulated.window
-    grid = ConfidenceGrid(resolution=FINE)
-    sides = np.ceil(np.array(window.count.shape) * window.resolution / FINE)
-    if sides.prod() > MOST_CELLS:
+    low, sides = window.origin.copy(), np.array(window.shape[::-1]) * window.resolution
+    if window.origin.size == 3:  # from the ground to above all solids, also beyond what is judged
+        top = max([low[2] + sides[2], *(solid.top + ABOVE for solid in simulated.world.solids)])
+        low[2], sides[2] = -FINE, top + FINE
+    shape = np.ceil(sides / FINE)[::-1]
+    if shape.prod() > MOST_CELLS:
         raise InputError(
             "world",
             f"{MOST_CELLS:g} cells of {FINE} m at most, to compare routes with",
-            f"{sides.prod():.3g}",
+            f"{shape.prod():.3g}",
             hint="Give smaller bounds [m].",
         )
-    rows, cols = sides.astype(int)
-    lower = np.floor(window.origin / FINE).astype(np.int64)[::-1]
+    lower = np.floor(low / FINE).astype(np.int64)[::-1]
     origin = lower[::-1].astype(np.float64) * FINE
-    nonfree = touched_cells(simulated.truth.obstacles, origin, FINE, (int(rows), int(cols)))
+    box = CellBox(lower, lower + shape.astype(np.int64), origin, FINE)
+    nonfree = simulated.truth.nonfree_on(box)
+    grid = ConfidenceGrid(resolution=FINE, origin=np.zeros(nonfree.ndim).tolist())
     grid.fuse(lower, np.where(nonfree, 1.0, -1.0).astype(np.float32))
     return grid

@@ -12,6 +12,7 @@ import numpy as np
 from groundmap import GridWindow, GroundmapError, GroundMapper, draw, fit_ground, read_views
 from groundmap.evaluate.protocols import evaluate
 from groundmap.simulate.measures import measure
+from groundmap.simulate.truth import Truth
 from planners.scenario.case import Scenario, load_scenario
 from planners.scenario.outcome import Bound, Figure, Outcome
 from planners.scenario.queries import bounds_of
@@ -105,8 +106,10 @@ def _run_recorded(scenario: Scenario) -> CaseResult:
 
 
 def _picture(simulated: Simulated, answers: list[QueryOutcome], title: str) -> bytes:
-    """Draw truth, map and difference of the world and a margin around it."""
+    """Draw truth, map and difference of the world and a margin around it; in 3-D, the map."""
     truth, window = simulated.truth, simulated.window
+    if not isinstance(truth, Truth):
+        return _picture_3d(simulated, answers)
     corners = window.world_to_cell(np.reshape(simulated.world.bounds, (2, 2)))
     margin = int(np.ceil(MARGIN / window.resolution))
     low = np.maximum(corners[0] - margin, 0)
@@ -135,6 +138,21 @@ def _picture(simulated: Simulated, answers: list[QueryOutcome], title: str) -> b
         ],
         trajectory=simulated.grid.trajectory,
         title=title,
+    )
+    return draw.figure_png(figure, dpi=DPI)
+
+
+def _picture_3d(simulated: Simulated, answers: list[QueryOutcome]) -> bytes:
+    """Draw a 3-D map and the routes on it."""
+    window = simulated.window
+    xmin, ymin, xmax, ymax = simulated.world.bounds
+    top = window.origin[2] + window.shape[0] * window.resolution
+    routes = {a.query.name: a.waypoints for a in answers if a.waypoints is not None}
+    figure = draw.voxel_figure(
+        simulated.grid,
+        bounds=(xmin, ymin, -window.resolution, xmax, ymax, top),
+        routes=routes,
+        footprint=max([a.query.radius for a in answers], default=0.0),
     )
     return draw.figure_png(figure, dpi=DPI)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -12,11 +12,15 @@ from groundmap import ConfidenceGrid, GridWindow, GroundMapper, View, fit_ground
 from groundmap.draw import known_bounds
 from groundmap.errors import InputError
 from groundmap.simulate import Drive, World, drive, observe, sample_landmarks
+from groundmap.simulate.known_map import KnownMap
 from groundmap.simulate.scan import scan
-from groundmap.simulate.truth import Truth, truth_of
+from groundmap.simulate.truth import truth_of
+from groundmap.simulate.voxel_truth import voxel_truth_of
 from planners.scenario.case import Scenario
 
 MOST_CELLS = 4e6  # in a world, since it is compared cell by cell
+#: By dimension of the map.
+TRUTHS: dict[int, Callable[..., KnownMap]] = {2: truth_of, 3: voxel_truth_of}
 
 
 class Simulated(NamedTuple):
@@ -25,7 +29,7 @@ class Simulated(NamedTuple):
     world: World
     grid: ConfidenceGrid
     window: GridWindow  #: cells of the map that the truth covers
-    truth: Truth
+    truth: KnownMap
 
 
 def simulate(scenario: Scenario) -> Simulated:
@@ -38,10 +42,13 @@ def simulate(scenario: Scenario) -> Simulated:
     mapper = GroundMapper(**scenario.mapper.model_dump())
     height = scenario.sensor.camera_height if scenario.level_ground else None
     views = views_of(scenario, world, moves)
-    for view in fit_ground(views, camera_height=height, **scenario.ground.model_dump()):
+    if not scenario.flies:
+        views = fit_ground(views, camera_height=height, **scenario.ground.model_dump())
+    for view in views:
         mapper.integrate(view)
-    window = _window(world, mapper.grid)
-    truth = truth_of(world, moves, scenario.sensor, window, scenario.mapper)
+    window = _window(world, mapper.grid, scenario.heights)
+    make_truth = TRUTHS[mapper.grid.ndim]
+    truth = make_truth(world, moves, scenario.sensor, window, scenario.mapper)
     return Simulated(world, mapper.grid, window, truth)
 
 
@@ -74,11 +81,17 @@ def views_of(scenario: Scenario, world: World, moves: Drive) -> Iterable[View]:
     return observe(world, landmarks, moves, scenario.sensor, seed=scenario.seed)
 
 
-def _window(world: World, grid: ConfidenceGrid) -> GridWindow:
-    """Return the cells of the map in the bounds of the world and of all observed cells."""
+def _window(world: World, grid: ConfidenceGrid, heights: tuple[float, float]) -> GridWindow:
+    """Return the cells of the map in the bounds of the world and of all observed cells.
+
+    In 3-D, only voxels whose centres are between two heights.
+    """
     known = known_bounds(grid)
     low = np.minimum(world.bounds[:2], known[:2])
-    high = np.maximum(world.bounds[2:], known[2:])
+    high = np.maximum(world.bounds[2:], known[grid.ndim : grid.ndim + 2])
+    if grid.ndim == 3:
+        half = 0.5 * grid.resolution
+        low, high = np.append(low, heights[0] + half), np.append(high, heights[1] - half)
     cells = float(np.prod((high - low) / grid.resolution))
     if cells > MOST_CELLS:
         raise InputError(
