@@ -12,7 +12,7 @@ from groundmap.arrays import Floats, as_number
 from groundmap.errors import InputError, NoGroundPlaneError
 from groundmap.io.log import ViewLog
 from groundmap.io.readers.base import SparseMapLog
-from groundmap.sparse.ground_estimate import GroundEstimate, estimate_ground
+from groundmap.sparse.ground_estimate import GroundEstimate, estimate_ground, mean_up
 from groundmap.sparse.similarity import Similarity
 from groundmap.sparse.sparse_map import SparseMap
 from groundmap.view.view import View
@@ -34,13 +34,21 @@ class AlignedViews:
     log : ViewLog
     similarity : Similarity
     ground : GroundEstimate, optional
-        The ground of the log before, if it was estimated.
+        The ground of the log before, if it was estimated and found.
+    levelled : bool, default False
+        Whether the log was turned, by the ground if there is one, otherwise by its cameras.
     """
 
     def __init__(
-        self, log: ViewLog, similarity: Similarity, ground: GroundEstimate | None = None
+        self,
+        log: ViewLog,
+        similarity: Similarity,
+        ground: GroundEstimate | None = None,
+        *,
+        levelled: bool = False,
     ) -> None:
         self.log, self.similarity, self.ground = log, similarity, ground
+        self.levelled = levelled
 
     def __len__(self) -> int:
         return len(self.log)
@@ -97,7 +105,9 @@ def align(
         level = isinstance(log, SparseMapLog) and not (
             log.sparse.metric and log.sparse.up is not None
         )
-    ground = estimate_ground(log) if level or camera_height is not None else None
+    up = log.sparse.up if isinstance(log, SparseMapLog) else None
+    wanted = level or camera_height is not None
+    ground = estimate_ground(log, up=up) if wanted else None
     if ground is None and (camera_height is not None):
         raise NoGroundPlaneError(
             "no plane below the cameras contains enough features to measure the height of the "
@@ -113,9 +123,11 @@ def align(
         height = as_number("camera_height", camera_height, "a number above 0 [m]", above=0.0)
         factor = height / ground.camera_height
     rotation = np.eye(3)
-    if level and ground is not None:
-        rotation = _level_rotation(log, ground.up)
-    return AlignedViews(log, Similarity(scale=factor, rotation=rotation), ground)
+    if level:
+        vertical = ground.up if ground is not None else up if up is not None else mean_up(log)
+        if vertical is not None:
+            rotation = _level_rotation(log, vertical)
+    return AlignedViews(log, Similarity(scale=factor, rotation=rotation), ground, levelled=level)
 
 
 def _level_rotation(log: ViewLog, up: Floats) -> Floats:

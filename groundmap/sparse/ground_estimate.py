@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -16,13 +17,16 @@ MOST_FEATURES = 20_000  # that the search uses, evenly
 LEAST_AGREEMENT = 0.3  # length of the mean of the views' directions up
 PITCHES = np.tan(np.radians(np.arange(-40.0, 40.1, 2.5)))
 ROLLS = np.tan(np.radians(np.arange(-15.0, 15.1, 2.5)))
+SLOPES = np.tan(np.radians(np.arange(-10.0, 10.1, 2.5)))  # where up is known
 STEP = 0.05  # width of the bins of depths, as a share of the depth
 BELOW = 0.5  # weight of features below a plane against those on it
 REACH = 3.0  # [depth] to the side of the track, in the search and the refinement
 UNDER = (0.5, 1.0, 1.5, 2.0, 3.0)  # [depth] to the side of the track, for the camera height
 ENOUGH = 50  # features under the track that the camera height needs
 TOLERANCES = (0.25, 0.15, 0.1, 0.1, 0.1)  # of refinement steps, as a share of the depth
+STEEPNESS = 4  # power of the cosine of a plane's tilt in its score: walls are steep
 FEWEST = 12
+LEAST_SHARE = 0.03  # of the features, on the plane near the track
 TRACK_POINTS = 20  # between two views
 WORST_CONDITION = 1e10  # of the information matrix, for a depth of 1
 
@@ -40,7 +44,7 @@ class _Cloud(NamedTuple):
     axes: Floats  # (3, 3), rows forward, left and up of the views on average [map]
 
 
-def estimate_ground(views: Iterable[View]) -> GroundEstimate | None:
+def estimate_ground(views: Iterable[View], *, up: Floats | None = None) -> GroundEstimate | None:
     """Return the plane under the cameras of a log, or None if there is none.
 
     The search depends neither on the axes of the world nor on its unit. The plane is up to 40
@@ -50,9 +54,12 @@ def estimate_ground(views: Iterable[View]) -> GroundEstimate | None:
     Parameters
     ----------
     views : iterable of View
+    up : ndarray, shape (3,), optional [map of the log]
+        Direction against gravity, if it is known: the plane is then up to 10 degrees off it.
     """
-    cloud = _cloud(views)
-    plane = None if cloud is None else _search(cloud.points)
+    cloud = _cloud(views, up)
+    slopes = (PITCHES, ROLLS) if up is None else (SLOPES, SLOPES)
+    plane = None if cloud is None else _search(cloud.points, *slopes)
     for tolerance in TOLERANCES:
         if cloud is None or plane is None:
             return None
@@ -61,13 +68,17 @@ def estimate_ground(views: Iterable[View]) -> GroundEstimate | None:
         return None
     a, b, c = plane
     normal = np.array([-a, -b, 1.0]) / np.sqrt(1.0 + a * a + b * b)
-    depths = _under(cloud.points, normal, float(-c * normal[2]))
+    depth = float(-c * normal[2])
+    on = np.abs(cloud.points @ normal + depth) < TOLERANCES[-1] * depth
+    if on.sum() < max(FEWEST, LEAST_SHARE * len(cloud.points)):
+        return None
+    depths = _under(cloud.points, normal, depth)
     if not len(depths):
         return None
     return GroundEstimate(cloud.axes.T @ normal, float(np.median(depths)), len(depths))
 
 
-def _cloud(views: Iterable[View]) -> _Cloud | None:
+def _cloud(views: Iterable[View], up: Floats | None) -> _Cloud | None:
     kept: list[View] = []
     stride = 1
     for number, view in enumerate(views):
@@ -76,7 +87,7 @@ def _cloud(views: Iterable[View]) -> _Cloud | None:
         kept.append(view)
         if len(kept) > MOST_VIEWS:
             kept, stride = kept[::2], 2 * stride
-    axes = _mean_axes(kept)
+    axes = _mean_axes(kept, up)
     if axes is None:
         return None
     points = np.concatenate([_positions(view) for view in kept])
@@ -89,15 +100,27 @@ def _cloud(views: Iterable[View]) -> _Cloud | None:
     return _Cloud(level - track[nearest], axes)
 
 
-def _mean_axes(views: list[View]) -> Floats | None:
+def mean_up(views: Iterable[View]) -> Floats | None:
+    """Return the mean direction up of the first views, shape (3,) [map]; None if they disagree.
+
+    Parameters
+    ----------
+    views : iterable of View
+    """
+    axes = _mean_axes(list(islice(views, MOST_VIEWS)))
+    return None if axes is None else axes[2]
+
+
+def _mean_axes(views: list[View], up: Floats | None = None) -> Floats | None:
     """Return forward, left and up of the views on average, shape (3, 3) [map]; None if unclear."""
     if not views:
         return None
-    up = np.mean([view.T_map_base[:3, :3] @ view.rig.up for view in views], axis=0)
+    if up is None:
+        up = np.mean([view.T_map_base[:3, :3] @ view.rig.up for view in views], axis=0)
     length = float(np.linalg.norm(up))
     if length < LEAST_AGREEMENT:
         return None
-    up /= length
+    up = up / length
     axis = np.mean([view.T_map_camera[:3, 2] for view in views], axis=0)
     forward = axis - (axis @ up) * up
     if np.linalg.norm(forward) < 1e-6:
@@ -119,7 +142,7 @@ def _track(centres: Floats) -> Floats:
     return np.concatenate([steps.reshape(-1, 3), centres[-1:]])
 
 
-def _search(points: Floats) -> Floats | None:
+def _search(points: Floats, pitches: Floats, rolls: Floats) -> Floats | None:
     """Return the plane (a, b, c: up = a forward + b left + c) with most features on it.
 
     A Hough transform over pitch, roll and the logarithm of the depth, which needs no unit. Features
@@ -127,8 +150,8 @@ def _search(points: Floats) -> Floats | None:
     """
     best, found = -np.inf, None
     aside = np.hypot(points[:, 0], points[:, 1])
-    for pitch in PITCHES:
-        for roll in ROLLS:
+    for pitch in pitches:
+        for roll in rolls:
             tilt = np.sqrt(1.0 + pitch * pitch + roll * roll)
             depth = (pitch * points[:, 0] + roll * points[:, 1] - points[:, 2]) / tilt
             inside = (depth > 0) & (aside < REACH * depth)
@@ -141,7 +164,7 @@ def _search(points: Floats) -> Floats | None:
             on = votes + padded[:-2] + padded[2:]
             deeper = votes.sum() - np.cumsum(votes)
             heights = np.exp((lowest + np.arange(len(votes)) + 0.5) * STEP)
-            score = (on - BELOW * (deeper - padded[2:])) / heights
+            score = (on - BELOW * (deeper - padded[2:])) / heights / tilt**STEEPNESS
             score[on < FEWEST] = -np.inf
             column = int(np.argmax(score))
             if score[column] > best:

@@ -22,6 +22,7 @@ SECTORS = 4  # views that a wide view is split into
 OVERLAP = np.radians(5.0)  # of neighbouring sectors on either side, so that links cross borders
 USUAL_BORDER = 1.0  # tangent, of a camera that saw nothing
 WIDEST_BORDER = 20.0
+LEAST_UPRIGHT = 0.3  # share of up in the image; a camera that looks up or down has less
 DIGITS = re.compile(r"([0-9]+)")
 
 
@@ -43,7 +44,7 @@ class SparseViews:
         self._covariance = landmark_covariance(sparse, point_noise=point_noise)
         self._T_map_world = np.eye(4) if _is_rep103(sparse) else T_REP103_OPTICAL
         self._wide = _wide_cameras(sparse)
-        self._rigs = [_rig(camera, _border(sparse, n)) for n, camera in enumerate(sparse.cameras)]
+        self._rigs = [_rigs(sparse, number) for number in range(len(sparse.cameras))]
         self._up = _up(sparse)
         self._order = _order(sparse)
 
@@ -67,7 +68,8 @@ class SparseViews:
             if self._wide[camera]:
                 yield from self._sectors(view)
             else:
-                yield self._view(view, self.sparse.T_world_camera[view], self._rigs[camera])
+                pose, turns = upright(self.sparse.T_world_camera[view], self._up)
+                yield self._view(view, pose, self._rigs[camera][turns % 2])
 
     def _view(
         self, view: int, T_world_camera: Floats, rig: StereoRig, keep: Bools | None = None
@@ -180,6 +182,42 @@ def _border(sparse: SparseMap, number: int) -> float:
     x, _, z = np.einsum("ki,kij->jk", offsets, rotations)
     tangents = np.abs(x[z > 0] / z[z > 0])
     return float(min(tangents.max(initial=0.0), WIDEST_BORDER)) or USUAL_BORDER
+
+
+def _rigs(sparse: SparseMap, number: int) -> tuple[StereoRig, StereoRig]:
+    """Return rigs with the borders of a camera, and of the same camera on its side."""
+    camera, border = sparse.cameras[number], _border(sparse, number)
+    ratio = camera.height / camera.width if camera.width and camera.height else 1.0
+    return _rig(camera, border), _rig(camera, border * ratio)
+
+
+def upright(T_world_camera: Floats, up: Floats) -> tuple[Floats, int]:
+    """Return a camera's pose turned about its axis until -y is up, and the quarter turns.
+
+    Phones write portraits as landscapes on their side.
+
+    Parameters
+    ----------
+    T_world_camera : ndarray, shape (4, 4)
+    up : ndarray, shape (3,) [world]
+
+    Examples
+    --------
+    >>> upright(np.eye(4), np.array([1.0, 0.0, 0.0]))[1]
+    1
+    """
+    right, above = up @ T_world_camera[:3, 0], -up @ T_world_camera[:3, 1]
+    if max(abs(right), abs(above)) < LEAST_UPRIGHT:
+        return T_world_camera, 0
+    turns = int(np.rint(np.arctan2(right, above) / (np.pi / 2))) % 4
+    if not turns:
+        return T_world_camera, 0
+    x, y = T_world_camera[:3, 0], T_world_camera[:3, 1]
+    turned = T_world_camera.copy()
+    for _ in range(turns):
+        x, y = y, -x
+    turned[:3, 0], turned[:3, 1] = x, y
+    return turned, turns
 
 
 def _rig(camera: Camera, border: float) -> StereoRig:

@@ -151,7 +151,12 @@ class Source:
                 "the unit of the source is unknown, and was taken for a metre: give --scale, "
                 "--scale-points or --camera-height"
             )
-        if self.normals and not self.views.similarity.tilt:
+        if self.views.levelled and self.views.ground is None:
+            found.append(
+                "no ground was found under the track: the world was levelled by the mean attitude "
+                "of the cameras"
+            )
+        if self.normals and not self.views.levelled:
             mean = np.mean(self.normals, axis=0)
             tilt = float(np.arccos(np.clip(mean[2] / np.linalg.norm(mean), -1.0, 1.0)))
             if tilt > MOST_TILT:

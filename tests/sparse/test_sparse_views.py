@@ -88,3 +88,31 @@ def test_views_are_in_the_order_of_their_times_or_of_the_numbers_in_their_names(
     timed = replace(sparse, names=(), timestamps=np.array([30.0, 10.0, 20.0]))
     for given in (sparse, timed):
         assert [-view.T_map_camera[1, 3] for view in SparseViews(given)] == [0.0, 1.0, 2.0]
+
+
+def test_a_portrait_that_was_written_on_its_side_is_turned_upright() -> None:
+    quarter = np.array([(0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)])
+    pose = np.eye(4)
+    pose[:3, :3] = quarter  # x of the camera points down
+    sparse = SparseMap(
+        system="test",
+        T_world_camera=pose[None],
+        landmarks=np.array([(1.0, 0.5, 4.0)]),
+        view_of=np.array([0]),
+        landmark_of=np.array([0]),
+        cameras=(Camera(model="flat", focal_px=500, width=1000, height=600),),
+        up=np.array([0.0, -1.0, 0.0]),
+    )
+    [view] = SparseViews(sparse)
+    npt.assert_allclose(view.points.xyz, [(1.0, 0.5, 4.0)])
+    npt.assert_allclose(view.T_map_camera[:3, 1], (0, 0, -1), atol=1e-12)
+    assert view.rig.cx / view.rig.fx == 0.6  # its borders are those of the other side
+
+
+def test_a_sparse_map_whose_world_has_z_up_keeps_its_axes() -> None:
+    sparse = replace(all_around(Camera(model="flat")), up=np.array([0.0, 0.0, 1.0]))
+    pose = np.eye(4)
+    pose[:3, :3] = T_REP103_OPTICAL[:3, :3]
+    pose[:3, 3] = 1.0, 2.0, 3.0
+    [view] = SparseViews(replace(sparse, T_world_camera=pose[None]))
+    npt.assert_allclose(view.T_map_camera, pose)
