@@ -8,24 +8,34 @@ from typing import Annotated, Any
 
 import typer
 
-from groundmap import draw, read_views
+from groundmap import draw
 from groundmap.evaluate.protocols import Verdict, evaluate
 from planners.commands.console import JsonOption, emit, emit_columns, show_progress
 from planners.commands.settings_file import ConfigOption, read_settings
+from planners.commands.sources import (
+    CameraHeightOption,
+    FormatOption,
+    LevelOption,
+    PointNoiseOption,
+    PosesOption,
+    ScaleOption,
+    ScalePointsOption,
+    SourceArgument,
+    open_source,
+)
 
 
 def evaluate_command(
-    source: Annotated[Path, typer.Argument(help="Folder with a log of views.")],
-    poses: Annotated[
-        Path | None,
-        typer.Option(help="File with poses to use instead: TUM rows, or id + 16 numbers."),
-    ] = None,
+    source: SourceArgument,
+    poses: PosesOption = None,
+    format: FormatOption = None,
+    scale: ScaleOption = None,
+    scale_points: ScalePointsOption = None,
+    camera_height: CameraHeightOption = None,
+    level: LevelOption = None,
+    point_noise: PointNoiseOption = None,
     plot: Annotated[
         Path | None, typer.Option(help="Draw the map and the held-out features: .png, .pdf, .svg.")
-    ] = None,
-    camera_height: Annotated[
-        float | None,
-        typer.Option(help="Height of the camera above level ground [m]; default: fitted."),
     ] = None,
     config: ConfigOption = None,
     as_json: JsonOption = False,
@@ -33,17 +43,26 @@ def evaluate_command(
     """Judge maps of a log by features held out of them; figures are shares from 0 to 1."""
     if plot is not None:
         draw.check_picture(plot)
-    log = read_views(source, poses=poses)
+    opened = open_source(
+        source,
+        format=format,
+        poses=poses,
+        scale=scale,
+        scale_points=scale_points,
+        camera_height=camera_height,
+        level=level,
+        point_noise=point_noise,
+    )
 
     def watch(steps: list[Any]) -> Any:
         return show_progress(steps, total=len(steps), what="mapping and judging")
 
     settings = read_settings(config)
     verdicts = evaluate(
-        log,
+        opened.views,
         watch=watch,
         ground=settings["ground"],
-        camera_height=camera_height,
+        camera_height=opened.camera_height,
         **settings["mapper"],
     )
     if plot is not None:

@@ -32,6 +32,7 @@ from planners.commands.sources import (
     PosesOption,
     ScaleOption,
     ScalePointsOption,
+    SourceArgument,
     open_source,
 )
 
@@ -40,10 +41,7 @@ NOT_MAPPING = {"startup", "read", "compile", "save", "other"}
 
 
 def map_command(
-    source: Annotated[
-        Path,
-        typer.Argument(help="Folder with a log of views, or the map of a SLAM or SfM system."),
-    ],
+    source: SourceArgument,
     out: Annotated[Path, typer.Option(help="File of the map: .npz.")],
     poses: PosesOption = None,
     format: FormatOption = None,

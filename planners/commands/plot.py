@@ -11,20 +11,30 @@ import numpy as np
 import numpy.typing as npt
 import typer
 
-from groundmap import ConfidenceGrid, GroundMapper, draw, fit_ground, read_views
+from groundmap import ConfidenceGrid, GroundMapper, draw, fit_ground
 from groundmap.arrays import Floats, as_floats, check_finite
 from groundmap.errors import FileFormatError, InputError
 from groundmap.files.documents import read_json
 from groundmap.io import files_of, load_map
 from planners.commands.console import JsonOption, emit, numbers
 from planners.commands.settings_file import ConfigOption, read_settings
+from planners.commands.sources import (
+    CameraHeightOption,
+    FormatOption,
+    LevelOption,
+    ScaleOption,
+    Source,
+    open_source,
+)
 from planners.search.graph import Graph
 
 
 def plot_command(
     map_file: Annotated[
         Path,
-        typer.Argument(metavar="MAP", help="A map, as for `plan`; with --explain, a log."),
+        typer.Argument(
+            metavar="MAP", help="A map, as for `plan`; with --explain, a source, as for `map`."
+        ),
     ],
     out: Annotated[
         Path | None, typer.Option(help="Picture: .png, .pdf or .svg; default: beside MAP.")
@@ -35,12 +45,10 @@ def plot_command(
             metavar="VIEW", help="Draw the evidence of view number VIEW of a log, from 0."
         ),
     ] = None,
-    camera_height: Annotated[
-        float | None,
-        typer.Option(
-            help="With --explain: height of the camera above level ground [m]; default: fitted."
-        ),
-    ] = None,
+    format: FormatOption = None,
+    scale: ScaleOption = None,
+    camera_height: CameraHeightOption = None,
+    level: LevelOption = None,
     config: ConfigOption = None,
     bounds: Annotated[
         str | None,
@@ -54,7 +62,10 @@ def plot_command(
     picture = out or _beside(map_file)
     draw.check_picture(picture, sources=files_of(map_file))
     if explain is not None:
-        _draw_view(map_file, explain, camera_height, read_settings(config), picture)
+        source = open_source(
+            map_file, format=format, scale=scale, camera_height=camera_height, level=level
+        )
+        _draw_view(source, explain, read_settings(config), picture)
         emit({"out": str(picture)}, as_json=as_json, title=f"view {explain} of {map_file}")
         return
     grid = load_map(map_file)
@@ -112,22 +123,16 @@ def _beside(map_file: Path) -> Path:
     return map_file.with_suffix(".png")
 
 
-def _draw_view(
-    source: Path,
-    number: int,
-    camera_height: float | None,
-    settings: dict[str, dict[str, Any]],
-    out: Path,
-) -> None:
+def _draw_view(source: Source, number: int, settings: dict[str, dict[str, Any]], out: Path) -> None:
     """Draw the evidence of one view of a log, to a file."""
-    log = read_views(source)
-    if not 0 <= number < len(log):
-        raise InputError("explain", f"a view from 0 to {len(log) - 1}", str(number))
+    count = len(source.views)
+    if not 0 <= number < count:
+        raise InputError("explain", f"a view from 0 to {count - 1}", str(number))
     mapper = GroundMapper(**settings["mapper"])
-    views = fit_ground(log, camera_height=camera_height, **settings["ground"])
+    views = fit_ground(source.views, camera_height=source.camera_height, **settings["ground"])
     parts = mapper.explain(next(islice(views, number, None)))
-    figure = draw.draw_view(parts, mapper.grid, title=f"view {number} of {source}")
-    draw.save_figure(figure, out)
+    title = f"view {number} of {source.log.path}"
+    draw.save_figure(draw.draw_view(parts, mapper.grid, title=title), out)
 
 
 def _read_route(path: Path) -> Floats:

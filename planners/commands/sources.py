@@ -21,6 +21,10 @@ EXAMPLE_HEIGHT = 1.4  # [m], of a camera, in the sentence that explains --scale
 MOST_TILT = np.radians(5.0)  # of the ground of a log that is not levelled
 LOW, HIGH = 0.05, 0.95  # quantiles of the heights of the cameras
 
+SourceArgument = Annotated[
+    Path,
+    typer.Argument(help="Folder with a log of views, or the map of a SLAM or SfM system."),
+]
 FormatOption = Annotated[
     str | None,
     typer.Option(help="Format of the source; default: detected from the contents of its files."),
