@@ -21,13 +21,13 @@ from groundmap.io.readers.base import SparseMapLog
 from groundmap.io.readers.colmap_binary import read_binary
 from groundmap.io.readers.colmap_parts import SINGLE_FOCAL, Model
 from groundmap.io.readers.colmap_text import read_text
-from groundmap.sparse.cameras import Camera
+from groundmap.sparse.cameras import Camera, Projection, equirectangular
 from groundmap.sparse.sparse_map import SparseMap
 
 PARTS = ("cameras", "images", "points3D")
 READERS = {".bin": read_binary, ".txt": read_text}
 PLACES = (".", "sparse/0", "sparse", "colmap/sparse/0", "colmap/sparse", "distorted/sparse/0", "0")
-FISHEYE = ("FISHEYE", "FOV")
+WIDE = ("FISHEYE", "FOV", "EUCM")  # parts of the names of models that see widely
 
 
 class ColmapLog(SparseMapLog):
@@ -85,7 +85,7 @@ def _assemble(folder: Path, model: Model) -> SparseMap:
     check_distinct(folder, model.camera_ids, "camera")
     check_distinct(folder, model.image_ids, "image")
     check_distinct(folder, model.point_ids, "point")
-    cameras = tuple(_camera(folder, *values) for values in model.cameras)
+    cameras = tuple(_camera(*values) for values in model.cameras)
     camera_of, known = find_ids(model.camera_ids, model.image_cameras)
     if not known.all():
         unknown = model.image_cameras[~known][0]
@@ -110,7 +110,22 @@ def _assemble(folder: Path, model: Model) -> SparseMap:
         camera_of=camera_of,
         pixels=pixels,
         dropped=+dropped,
+        notes=_notes(folder),
     )
+
+
+def _notes(folder: Path) -> tuple[str, ...]:
+    """Return a note about the other models of a project, which are numbered."""
+    if not folder.name.isdigit():
+        return ()
+    others = [
+        place.name
+        for place in sorted(folder.resolve().parent.iterdir())
+        if place.name.isdigit() and place.name != folder.name
+    ]
+    if not others:
+        return ()
+    return (f"the project has other models, which are not used: {', '.join(others[:10])}",)
 
 
 def _sightings(model: Model) -> tuple[Ints, Ints, Floats | None, int]:
@@ -125,16 +140,18 @@ def _sightings(model: Model) -> tuple[Ints, Ints, Floats | None, int]:
     return views[known], landmarks[known], None, int((~known).sum())
 
 
-def _camera(folder: Path, model: str, width: int, height: int, params: Floats) -> Camera:
-    """Return a camera; all models of COLMAP begin with f, cx, cy or fx, fy, cx, cy."""
+def _camera(model: str, width: int, height: int, params: Floats) -> Camera:
+    """Return a camera; the parameters begin with f, cx, cy or fx, fy, cx, cy."""
+    if model == "EQUIRECTANGULAR":
+        return equirectangular(model, width, height)
     if model in SINGLE_FOCAL:
         focal, cx = params[0], params[1]
     else:
         focal, cx = 0.5 * (params[0] + params[1]), params[2]
-    projection = "fisheye" if any(name in model for name in FISHEYE) else "perspective"
+    projection: Projection = "fisheye" if any(part in model for part in WIDE) else "perspective"
     return Camera(
         model=model,
-        projection=projection,  # type: ignore[arg-type]
+        projection=projection,
         focal_px=float(focal),
         width=width,
         height=height,

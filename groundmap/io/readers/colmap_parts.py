@@ -24,6 +24,8 @@ MODELS = {
     "DIVISION": 5,
     "SIMPLE_FISHEYE": 3,
     "FISHEYE": 4,
+    "EUCM": 6,
+    "EQUIRECTANGULAR": 2,
 }
 # Models whose parameters begin with f, cx, cy; those of the others with fx, fy, cx, cy.
 SINGLE_FOCAL = frozenset(

@@ -58,7 +58,9 @@ def _images(path: Path) -> tuple[Ints, Floats, Ints, list[str], Ints, Floats, In
     keypoints: list[Floats] = []
     with open_rows(path) as stream:
         lines = _lines(stream)
-        for number, line in lines:
+        pending: list[tuple[int, str]] = []
+        while (entry := pending.pop() if pending else next(lines, None)) is not None:
+            number, line = entry
             if not line:
                 continue
             words = line.split(None, 9)
@@ -70,6 +72,9 @@ def _images(path: Path) -> tuple[Ints, Floats, Ints, list[str], Ints, Floats, In
             cameras.append(_whole(path, words[8], number))
             names.append(words[9])
             second, points = next(lines, (number + 1, ""))
+            if _is_image(points):  # some converters leave out the line of the points
+                pending.append((second, points))
+                points = ""
             keypoints.append(_triples(path, points, second))
     table = np.concatenate([np.empty((0, 3)), *keypoints])
     counts = np.array([len(rows) for rows in keypoints], dtype=np.int64)
@@ -83,6 +88,22 @@ def _images(path: Path) -> tuple[Ints, Floats, Ints, list[str], Ints, Floats, In
         table[:, :2],
         _as_ids(path, table[:, 2]),
     )
+
+
+def _is_image(line: str) -> bool:
+    """Return whether a line is that of an image: ten columns, the last of which is a name."""
+    words = line.split()
+    if len(words) < 10:
+        return False
+    try:
+        [float(word) for word in words[:9]]
+    except ValueError:
+        return False
+    try:
+        float(words[9])
+    except ValueError:
+        return True
+    return False
 
 
 def _points(path: Path) -> tuple[Ints, Floats, Ints, Ints]:

@@ -24,7 +24,8 @@ from groundmap.io.rows import open_rows
 from groundmap.sparse.cameras import Camera, Projection, equirectangular
 from groundmap.sparse.sparse_map import SparseMap
 
-RECONSTRUCTIONS = ("reconstruction.json", "reconstruction.meshed.json")
+# The second is that of a project of OpenDroneMap.
+RECONSTRUCTIONS = ("reconstruction.json", "opensfm/reconstruction.json")
 TRACKS = "tracks.csv"
 VERSION = "OPENSFM_TRACKS_VERSION"
 SPHERICAL = {"spherical", "equirectangular"}

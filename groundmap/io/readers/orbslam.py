@@ -2,7 +2,8 @@
 
 The trajectory has rows in TUM form (``t x y z qx qy qz qw``, camera to world). ORB-SLAM2 and 3 do
 not save which keyframe saw which point; common forks write a row ``x y z t1 t2 ...`` for each
-point, with the stamps of its keyframes, or the indices of rows of the trajectory.
+point, with the stamps of its keyframes, or the indices of rows of the trajectory. An id may stand
+in front, and the number of keyframes after the position.
 """
 
 from __future__ import annotations
@@ -124,17 +125,38 @@ class _Match(NamedTuple):
 
 def _read_sightings(path: Path) -> _Sightings:
     numbers, counts, lines = read_words(path)
-    short = np.flatnonzero(counts < 3)
+    start = _position_column(numbers, counts)
+    short = np.flatnonzero(counts < start + 3)
     if len(short):
         expected = "x y z and the stamps of the keyframes"
         line = int(lines[short[0]])
         raise FileFormatError(path, expected, f"{counts[short[0]]} numbers", line=line)
-    starts = np.cumsum(counts) - counts
-    points = numbers[starts[:, None] + np.arange(3)]
-    is_position = np.zeros(len(numbers), dtype=np.bool_)
-    is_position[(starts[:, None] + np.arange(3)).ravel()] = True
-    owner = np.repeat(np.arange(len(counts)), counts - 3)
-    return _Sightings(path, points, owner, seconds(numbers[~is_position]))
+    first = np.cumsum(counts) - counts
+    place = np.arange(len(numbers)) - np.repeat(first, counts)
+    owner = np.repeat(np.arange(len(counts)), counts)
+    after = start + 3
+    if _has_count(numbers, counts, after):
+        after += 1
+    seen = place >= after
+    points = numbers[(first + start)[:, None] + np.arange(3)]
+    return _Sightings(path, points, owner[seen], seconds(numbers[seen]))
+
+
+def _position_column(numbers: Floats, counts: Ints) -> int:
+    """Return the column of x: 1 if all rows begin with a whole number of their own."""
+    first = numbers[np.cumsum(counts) - counts]
+    with np.errstate(invalid="ignore"):
+        whole = np.isfinite(first).all() and (np.rint(first) == first).all()
+    return int(len(first) > 1 and whole and len(np.unique(first)) == len(first))
+
+
+def _has_count(numbers: Floats, counts: Ints, column: int) -> bool:
+    """Return whether a column of all rows counts the numbers after it."""
+    longer = counts > column
+    if not longer.all():
+        return False
+    values = numbers[np.cumsum(counts) - counts + column]
+    return bool((values == counts - column - 1).all())
 
 
 def _match(track: Trajectory, sightings: _Sightings) -> _Match:

@@ -18,12 +18,13 @@ from groundmap.errors import FileFormatError
 from groundmap.io.readers.base import SparseMapLog
 from groundmap.io.readers.point_clouds import Cloud
 from groundmap.io.readers.rosbag_content import CLOUD, BagContent, is_bag, read_bag
-from groundmap.io.readers.sniffing import matching_files
+from groundmap.io.readers.sniffing import head_of, matching_files
 from groundmap.io.readers.transforms import TransformTree
 from groundmap.sparse.cameras import Camera
 from groundmap.sparse.sparse_map import SparseMap
 from groundmap.view.frames import T_REP103_OPTICAL
 
+METADATA, DESCRIPTION = "metadata.yaml", b"rosbag2_bagfile_information"
 BASES = ("base_link", "base_footprint", "base")
 UP = np.array([0.0, 0.0, 1.0])
 UPRIGHT = 0.7  # cosine of the angle between z of a sensor frame and z of the world
@@ -39,18 +40,25 @@ class RosbagLog(SparseMapLog):
     @classmethod
     def recognises(cls, path: Path) -> bool:
         """Return whether a file is a bag, or a folder one of ROS 2, by their first bytes."""
-        return bool(matching_files(path, is_bag))
+        return _is_folder(path) or bool(matching_files(path, is_bag))
 
     def read_map(self, path: Path) -> SparseMap:
         """Read the clouds with most messages, and their poses."""
-        files = matching_files(path, is_bag)
-        folder = path.is_dir() and (path / "metadata.yaml").is_file()
-        if not folder and len(files) > 1:
+        path = path.parent if path.name == METADATA else path
+        folder = _is_folder(path)
+        files = [] if folder else matching_files(path, is_bag)
+        if len(files) > 1:
             names = ", ".join(file.name for file in files[:5])
             raise FileFormatError(path, "one bag", f"{len(files)}: {names}", hint="Give one.")
-        content = read_bag(path if folder or not files else files[0])
+        content = read_bag(path if not files else files[0])
         topic = _choose_topic(path, content)
         return _assemble(path, content, topic)
+
+
+def _is_folder(path: Path) -> bool:
+    """Return whether a folder is a bag of ROS 2, or a file the description of one."""
+    file = path if path.name == METADATA else path / METADATA
+    return DESCRIPTION in head_of(file)
 
 
 def _choose_topic(path: Path, content: BagContent) -> str:

@@ -73,9 +73,15 @@ def _mono(path: Path, blob: bytes, start: int) -> Calibration:
     transform = np.eye(4)
     if head[10]:
         transform[:3] = np.frombuffer(blob, "<f4", 12, end).astype(np.float64).reshape(3, 4)
-    model = "RTAB-Map"
+    several = start == 0 and len(blob) > end + 4 * head[10]
     camera = Camera(
-        model=model, focal_px=float(matrix[0]), width=width, height=height, cx=float(matrix[2])
+        model="RTAB-Map",
+        # The features of several cameras are to all sides of the first.
+        projection="fisheye" if several else "perspective",
+        focal_px=float(matrix[0]),
+        width=width,
+        height=height,
+        cx=float(matrix[2]),
     )
     return Calibration(camera, transform)
 

@@ -154,6 +154,8 @@ def _plausible(
     with np.errstate(over="ignore", invalid="ignore"):
         apart = np.linalg.norm(landmarks[rows] - poses[views, :3, 3], axis=1)
         near, far = apart < 1e-6, ~(apart < FARTHEST)
+    # Depth cameras leave landmarks at the origin, where the first camera is.
+    near |= (landmarks[rows] == 0.0).all(axis=1)
     dropped["sightings_in_the_camera"] += int(near.sum())
     dropped["sightings_too_far"] += int(far.sum())
     return ~(near | far)

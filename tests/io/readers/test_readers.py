@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
+import msgpack
 import numpy as np
 import numpy.testing as npt
 import pytest
 
 import sparse_scene
+from groundmap.errors import FileFormatError
 from groundmap.io import read_views
 from groundmap.io.readers.base import SparseMapLog
 from sparse_scene import Files, Scene, make_scene
@@ -80,3 +85,95 @@ def test_views_hold_the_landmarks_in_the_frame_of_their_camera(name: str, tmp_pa
         expected = [SCENE.in_camera(number, landmark) for landmark in SCENE.seen_by(number)]
         npt.assert_allclose(np.sort(view.points.xyz, axis=0), np.sort(expected, axis=0), atol=1e-6)
         assert np.linalg.eigvalsh(view.points.covariance).min() > 0
+
+
+def changed(files: Files, name: str, old: bytes, new: bytes) -> Files:
+    assert old in files[name]
+    return files | {name: files[name].replace(old, new)}
+
+
+def test_images_of_colmap_may_lack_the_line_of_their_points(tmp_path: Path) -> None:
+    files = sparse_scene.colmap_text(SCENE)
+    lines = files["images.txt"].decode().splitlines()
+    bare = "\n".join([lines[0], *lines[1::2]]) + "\n"
+    # The tracks of the points are then the sightings.
+    log = opened(write(files | {"images.txt": bare.encode()}, tmp_path / "map"))
+    assert pairs_of(log) == set(SCENE.pairs)
+    assert log.sparse.pixels is None
+
+
+@pytest.mark.parametrize("camera", ["17 2 1280 720", "16 6 500 500 640 360 0.5 1.0"])
+def test_the_newest_camera_models_of_colmap_are_wide(tmp_path: Path, camera: str) -> None:
+    model, count, *params = camera.split()
+    head = struct.pack("<QIiQQ", 1, 3, int(model), 1280, 720)
+    data = head + struct.pack(f"<{count}d", *map(float, params))
+    files = sparse_scene.colmap_binary(SCENE) | {"cameras.bin": data}
+    sparse = opened(write(files, tmp_path / "map")).sparse
+    assert sparse.cameras[0].projection != "perspective"
+
+
+def test_an_unknown_camera_model_is_named(tmp_path: Path) -> None:
+    files = changed(sparse_scene.colmap_text(SCENE), "cameras.txt", b"SIMPLE_RADIAL", b"MAGIC_LENS")
+    with pytest.raises(FileFormatError, match=r"SIMPLE_PINHOLE, .* got 'MAGIC_LENS' at line 2"):
+        read_views(write(files, tmp_path / "map"))
+
+
+def test_other_models_of_a_project_are_named(tmp_path: Path) -> None:
+    for number in ("0", "1"):
+        write(
+            {f"sparse/{number}/{n}": d for n, d in sparse_scene.colmap_binary(SCENE).items()},
+            tmp_path / "project",
+        )
+    notes = opened(tmp_path / "project").sparse.notes
+    assert notes == ("the project has other models, which are not used: 1",)
+
+
+@pytest.mark.parametrize("layout", ["id", "count", "index"])
+def test_other_layouts_of_points_with_keyframes_are_read(tmp_path: Path, layout: str) -> None:
+    rows = []
+    for number, place in enumerate(SCENE.landmarks):
+        seen = SCENE.views_of(number)
+        words = [f"{value:.9f}" for value in place]
+        stamps = [f"{1700000000 + 0.1 * view:.6f}" for view in seen]
+        if layout == "id":
+            words = [str(3 * number), *words, *stamps]
+        elif layout == "count":
+            words = [*words, str(len(seen)), *stamps]
+        else:
+            words = [*words, *map(str, seen)]
+        rows.append(" ".join(words))
+    files = {"traj.txt": sparse_scene.tum(SCENE), "points.txt": "\n".join(rows).encode()}
+    assert pairs_of(opened(write(files, tmp_path / "map"))) == set(SCENE.pairs)
+
+
+def test_landmarks_of_depth_cameras_at_the_origin_are_dropped(tmp_path: Path) -> None:
+    content = msgpack.unpackb(sparse_scene.stella_msgpack(SCENE)["map.msg"])
+    content["landmarks"][str(SCENE.ids[3])]["pos_w"] = [0.0, 0.0, 0.0]
+    content["landmarks"][str(SCENE.ids[5])]["pos_w"] = [1e13, 0.0, 0.0]
+    log = opened(write({"map.msg": msgpack.packb(content)}, tmp_path / "map"))
+    lost = [pair for pair in SCENE.pairs if pair[1] in (3, 5)]
+    dropped = log.sparse.dropped
+    counts = (dropped["sightings_in_the_camera"], dropped["sightings_of_invalid_landmarks"])
+    assert sum(counts) + dropped["sightings_too_far"] == len(lost)
+
+
+@pytest.mark.parametrize("name", WRITERS)
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_a_truncated_file_is_refused_or_shorter(name: str, share: float, tmp_path: Path) -> None:
+    files = WRITERS[name](SCENE)
+    largest = max(files, key=lambda file: len(files[file]))
+    cut = files[largest][: int(share * len(files[largest]))]
+    write(files | {largest: cut}, tmp_path)
+    sightings = 0
+    with suppress(FileFormatError):
+        sightings = opened(tmp_path).sparse.sightings
+    assert sightings < len(SCENE.pairs)
+
+
+def test_poses_of_another_file_replace_those_of_a_map(tmp_path: Path) -> None:
+    folder = write(sparse_scene.orbslam(SCENE), tmp_path / "map")
+    moved = replace(SCENE, centres=SCENE.centres + np.array([0.0, 0.0, 0.5]))
+    (tmp_path / "poses.txt").write_bytes(sparse_scene.tum(moved))
+    log = read_views(folder, poses=tmp_path / "poses.txt")
+    assert isinstance(log, SparseMapLog)
+    npt.assert_allclose(log.sparse.centres, moved.centres, atol=1e-7)
