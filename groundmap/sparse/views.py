@@ -121,7 +121,7 @@ def _name_key(name: str) -> tuple[list[tuple[int, str]], str]:
     """Return a key that sorts ``image2`` before ``image10``, and pairs of a rig side by side."""
     base = name.replace("\\", "/").rpartition("/")[2]
     parts = DIGITS.split(base)
-    return [(int(part[-18:]), part) if part.isdigit() else (-1, part) for part in parts], name
+    return [(int(part[-18:]), part) if part.isdecimal() else (-1, part) for part in parts], name
 
 
 def _is_rep103(sparse: SparseMap) -> bool:

@@ -101,8 +101,8 @@ def _text_tables(path: Path) -> Finding | None:
     kinds = kinds_in(path)
     tracks = [file.name for kind in TRAJECTORIES for file in kinds.get(kind, [])]
     points = [file.name for file in kinds.get("points", [])]
-    if path.is_file() and path.name not in tracks + points:
-        return None
+    if path.is_file():
+        tracks, points = ([path.name] * (path.name in names) for names in (tracks, points))
     if tracks:
         hint = "The landmarks, and which view saw which, are missing: give the map that the same "
         return f"a trajectory alone ({tracks[0]})", hint + "program saves, or see docs/sources."
