@@ -10,7 +10,7 @@ import pytest
 
 from groundmap.errors import InputError, NoGroundPlaneError
 from groundmap.io import read_views
-from groundmap.io.align import ScalePoints, align
+from groundmap.io.alignment import ScalePoints, align
 from groundmap.io.log import ViewLog
 from sparse_scene import colmap_binary, make_scene
 
