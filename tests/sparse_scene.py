@@ -251,7 +251,7 @@ def opensfm(scene: Scene) -> Files:
         rows.append(
             f"{view}.jpg\t{scene.ids[landmark]}\t{landmark}\t{x}\t{y}\t0.001\t1\t2\t3\t-1\t-1"
         )
-    return {"reconstruction.json": json.dumps([part, whole]).encode(), "tracks.csv": _text(rows)}
+    return {"reconstruction.json": json.dumps([part, whole], indent=1).encode(), "tracks.csv": _text(rows)}
 
 
 def openmvg_json(scene: Scene) -> Files:
@@ -280,7 +280,7 @@ def openmvg_json(scene: Scene) -> Files:
     whole = {"sfm_data_version": "0.3", "root_path": "", "views": views}
     whole |= {"intrinsics": [{"key": 0, "value": kind}], "extrinsics": poses}
     whole |= {"structure": structure, "control_points": []}
-    return {"sfm_data.json": json.dumps(whole).encode()}
+    return {"sfm_data.json": json.dumps(whole, indent=1).encode()}
 
 
 def openmvg_binary(scene: Scene) -> Files:
@@ -370,7 +370,7 @@ def meshroom(scene: Scene) -> Files:
     ]
     whole = {"version": ["1", "2", "6"], "views": views, "intrinsics": [camera]}
     whole |= {"poses": poses, "structure": structure}
-    return {"sfm.sfm": json.dumps(whole).encode()}
+    return {"sfm.sfm": json.dumps(whole, indent=1).encode()}
 
 
 def stella_msgpack(scene: Scene) -> Files:

@@ -16,6 +16,7 @@ import pytest
 import sparse_scene
 from groundmap.errors import FileFormatError
 from groundmap.io import read_views
+from groundmap.io.readers.assembly import find_ids
 from groundmap.io.readers.base import SparseMapLog
 from sparse_scene import Files, Scene, make_scene
 
@@ -177,3 +178,12 @@ def test_poses_of_another_file_replace_those_of_a_map(tmp_path: Path) -> None:
     log = read_views(folder, poses=tmp_path / "poses.txt")
     assert isinstance(log, SparseMapLog)
     npt.assert_allclose(log.sparse.centres, moved.centres, atol=1e-7)
+
+
+@pytest.mark.parametrize("spread", [1, 10**6, 2**55])
+def test_ids_are_found_however_far_they_are_apart(spread: int) -> None:
+    ids = np.array([5, 1, 3]) * spread
+    wanted = np.array([3, 5, 4, 1, -7]) * spread
+    rows, known = find_ids(ids, wanted)
+    assert known.tolist() == [True, True, False, True, False]
+    assert rows[known].tolist() == [2, 0, 1]
