@@ -251,7 +251,10 @@ def opensfm(scene: Scene) -> Files:
         rows.append(
             f"{view}.jpg\t{scene.ids[landmark]}\t{landmark}\t{x}\t{y}\t0.001\t1\t2\t3\t-1\t-1"
         )
-    return {"reconstruction.json": json.dumps([part, whole], indent=1).encode(), "tracks.csv": _text(rows)}
+    return {
+        "reconstruction.json": json.dumps([part, whole], indent=1).encode(),
+        "tracks.csv": _text(rows),
+    }
 
 
 def openmvg_json(scene: Scene) -> Files:

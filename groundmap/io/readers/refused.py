@@ -10,10 +10,9 @@ from pathlib import Path
 from groundmap.errors import FileFormatError
 from groundmap.files.opening import open_file
 from groundmap.io.readers.orbslam import TRAJECTORIES, kinds_in
-from groundmap.io.readers.sniffing import head_of
+from groundmap.io.readers.sniffing import IMAGES, head_of
 
 WANTED = "poses, landmarks, and which view saw which"
-IMAGES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp"}
 MOST_ENTRIES = 2000
 ATLAS_HINT = "Save the trajectory and the points with their keyframes: see docs/sources/orbslam.md."
 

@@ -187,3 +187,40 @@ def test_ids_are_found_however_far_they_are_apart(spread: int) -> None:
     rows, known = find_ids(ids, wanted)
     assert known.tolist() == [True, True, False, True, False]
     assert rows[known].tolist() == [2, 0, 1]
+
+
+def test_a_map_among_thousands_of_images_is_found(tmp_path: Path) -> None:
+    for number in range(1000):
+        (tmp_path / f"{number}.jpg").touch()
+    assert opened(write(sparse_scene.nvm(SCENE), tmp_path)).sparse.sightings == len(SCENE.pairs)
+
+
+def test_a_folder_with_maps_of_two_systems_asks(tmp_path: Path) -> None:
+    write(sparse_scene.nvm(SCENE), tmp_path)
+    write(sparse_scene.colmap_binary(SCENE), tmp_path)
+    with pytest.raises(FileFormatError, match=r"colmap and nvm. Choose one: --format colmap, or "):
+        read_views(tmp_path)
+    assert opened(tmp_path / "model.nvm").sparse.system == "VisualSFM"
+    log = read_views(tmp_path, format="colmap")
+    assert isinstance(log, SparseMapLog)
+
+
+@pytest.mark.parametrize(
+    ("file", "data"),
+    [
+        ("reconstruction.json", b'[{"cameras": ' + b"[" * 100_000),
+        ("sfm_data.json", b'{"sfm_data_version": ' + b'{"a": ' * 5000 + b"1" + b"}" * 5001),
+        ("map.msg", b"\x81\xa7cameras" + b"\x91" * 100_000),
+        ("map.msg", b"\x81\xa7cameras\xdd\xff\xff\xff\xff"),
+        ("scene.mvs", b"MVSI" + struct.pack("<IIQ", 6, 0, 2**60)),
+        ("sfm_data.bin", b"\x01\x03" + bytes(7) + b"0.3" + struct.pack("<Q", 2**50)),
+        ("bundle.out", b"# Bundle file v0.3\n1e300 5\n"),
+        ("model.nvm", b"NVM_V3\n\n99999999999\n"),
+    ],
+)
+def test_absurd_depths_and_counts_are_refused_at_once(
+    tmp_path: Path, file: str, data: bytes
+) -> None:
+    (tmp_path / file).write_bytes(data)
+    with pytest.raises(FileFormatError, match=file):
+        read_views(tmp_path)
