@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -83,9 +84,12 @@ class SparseViews:
         covariance = rotation.T @ self._covariance[rows] @ rotation
         assert sparse.ids is not None
         T_map_base = self._T_map_world @ T_world_camera
-        if sparse.T_base_camera is not None and keep is None:
-            rig = StereoRig(**{**vars(rig), "T_base_camera": sparse.T_base_camera[view]})
-            T_map_base = T_map_base @ invert(sparse.T_base_camera[view])
+        if sparse.T_base_camera is not None:
+            # The camera may be turned against that of the file.
+            turn = invert(sparse.T_world_camera[view]) @ T_world_camera
+            T_base_camera = sparse.T_base_camera[view] @ turn
+            rig = replace(rig, T_base_camera=T_base_camera)
+            T_map_base = T_map_base @ invert(T_base_camera)
         return View(
             T_map_base=T_map_base,
             rig=rig,
