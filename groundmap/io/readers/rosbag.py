@@ -21,6 +21,7 @@ from groundmap.io.readers.rosbag_content import CLOUD, BagContent, is_bag, read_
 from groundmap.io.readers.sniffing import head_of, matching_files
 from groundmap.io.readers.transforms import TransformTree
 from groundmap.sparse.cameras import Camera
+from groundmap.sparse.covariance import measured_covariance
 from groundmap.sparse.sparse_map import SparseMap
 from groundmap.view.frames import T_REP103_OPTICAL
 
@@ -29,7 +30,6 @@ BASES = ("base_link", "base_footprint", "base")
 UP = np.array([0.0, 0.0, 1.0])
 UPRIGHT = 0.7  # cosine of the angle between z of a sensor frame and z of the world
 MOST_POINTS = 20_000  # of a cloud that are used, evenly
-NOISE = 0.005  # standard deviation of a distance, as a share of its square [1/m]
 
 
 class RosbagLog(SparseMapLog):
@@ -150,7 +150,9 @@ def _sparse(views: list[_View], dropped: Counter[str], notes: tuple[str, ...]) -
     local = [view.cloud.positions[keep] for view, keep in zip(views, finite, strict=True)]
     owners = np.repeat(np.arange(len(views)), [len(points) for points in local])
     positions = np.concatenate(local)
-    world = np.einsum("kij,kj->ki", poses[owners, :3, :3], positions) + poses[owners, :3, 3]
+    with np.errstate(over="ignore", invalid="ignore"):  # the map drops what is too far
+        world = np.einsum("kij,kj->ki", poses[owners, :3, :3], positions) + poses[owners, :3, 3]
+        covariance = measured_covariance(world - poses[owners, :3, 3])
     mounted = [view.T_base_camera for view in views if view.T_base_camera is not None]
     # A sensor that sees to all sides is split into flat views.
     camera = Camera(model="point cloud", projection="fisheye")
@@ -164,7 +166,7 @@ def _sparse(views: list[_View], dropped: Counter[str], notes: tuple[str, ...]) -
         names=tuple(f"{view.stamp:.9f}" for view in views),
         timestamps=np.array([view.stamp for view in views]),
         cameras=(camera,),
-        covariance=_covariance(positions, poses[owners, :3, :3]),
+        covariance=covariance,
         metric=True,
         up=UP,
         T_base_camera=np.array(mounted) if len(mounted) == len(views) else None,
@@ -179,14 +181,3 @@ def _ids(views: list[_View], finite: list[Any]) -> Any:
         for view, keep in zip(views, finite, strict=True)
     ]
     return np.concatenate([given[keep] for given, keep in zip(ids, finite, strict=True)])
-
-
-def _covariance(positions: Floats, rotations: Floats) -> Floats:
-    """Return the covariance of distances that are measured: along the ray by distance squared."""
-    squared = np.maximum(np.einsum("ki,ki->k", positions, positions), 1e-12)
-    rays = np.einsum("kij,kj->ki", rotations, positions) / np.sqrt(squared)[:, None]
-    along, across = NOISE**2 * squared**2, (1.0 / 500.0) ** 2 * squared
-    along = np.maximum(along, across)
-    covariance: Floats = across[:, None, None] * np.eye(3)
-    covariance += (along - across)[:, None, None] * np.einsum("ki,kj->kij", rays, rays)
-    return covariance

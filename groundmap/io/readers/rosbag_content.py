@@ -172,7 +172,9 @@ def _pose(position: Any, orientation: Any) -> Floats:
     quaternion = [orientation.x, orientation.y, orientation.z, orientation.w]
     values = np.array([position.x, position.y, position.z, *quaternion], dtype=np.float64)
     # As in tf, a quaternion is normalised, however long it is.
-    if not np.isfinite(values).all() or not 0.1 < np.linalg.norm(values[3:]) < 10.0:
+    with np.errstate(over="ignore"):
+        length = float(np.linalg.norm(values[3:]))
+    if not np.isfinite(values).all() or not 0.1 < length < 10.0:
         raise WrongCloudError(f"a pose of {values.tolist()}")
     pose = np.eye(4)
     pose[:3, :3] = Rotation.from_quat(values[3:]).as_matrix()

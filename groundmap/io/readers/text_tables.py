@@ -77,6 +77,11 @@ def kind_of(path: Path) -> TextKind | None:
 
 
 def _pose_kind(table: Floats) -> TextKind | None:
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _kind_by_width(table)
+
+
+def _kind_by_width(table: Floats) -> TextKind | None:
     width = table.shape[1]
     if width == 12:
         rotation = table.reshape(-1, 3, 4)[:, :, :3]
