@@ -29,7 +29,6 @@ METADATA, DESCRIPTION = "metadata.yaml", b"rosbag2_bagfile_information"
 BASES = ("base_link", "base_footprint", "base")
 UP = np.array([0.0, 0.0, 1.0])
 UPRIGHT = 0.7  # cosine of the angle between z of a sensor frame and z of the world
-MOST_POINTS = 20_000  # of a cloud that are used, evenly
 
 
 class RosbagLog(SparseMapLog):
@@ -99,7 +98,7 @@ class _View(NamedTuple):
 
 def _assemble(path: Path, content: BagContent, topic: str) -> SparseMap:
     clouds = content.clouds[topic]
-    dropped: Counter[str] = Counter()
+    dropped = Counter({"points_thinned_out": clouds.thinned})
     views = []
     for stamp, cloud in zip(clouds.stamps, clouds.clouds, strict=True):
         view = _view(content.tree, clouds.frame, stamp, cloud)
@@ -127,9 +126,6 @@ def _view(tree: TransformTree, frame: str, stamp: float, cloud: Cloud) -> _View 
     chain = tree.chain(frame)
     base = next((name for name in BASES if name in chain), None)
     T_base_sensor = None if base is None else tree.within(frame, base, stamp)
-    if len(cloud.positions) > MOST_POINTS:
-        step = -(-len(cloud.positions) // MOST_POINTS)
-        cloud = Cloud(cloud.positions[::step], None if cloud.ids is None else cloud.ids[::step])
     if not _is_optical(frame, pose):  # x forward, z up
         pose = pose @ T_REP103_OPTICAL
         cloud = Cloud(cloud.positions @ T_REP103_OPTICAL[:3, :3], cloud.ids)

@@ -26,6 +26,7 @@ TF = "tf2_msgs/msg/TFMessage"
 OLD_TF = "tf/msg/tfMessage"
 ODOMETRY = "nav_msgs/msg/Odometry"
 WANTED = {CLOUD, TF, OLD_TF, ODOMETRY}
+MOST_OF_A_CLOUD = 20_000  # points that are used, evenly
 MOST_POINTS = 50_000_000  # of all clouds of a bag
 SHOWN_TOPICS = 12
 # Exceptions of the library and of its decoders for damaged bags, collected by damaging bags.
@@ -40,6 +41,7 @@ class Clouds:
 
     frame: str
     has_ids: bool = False
+    thinned: int = 0  #: number of points that were left out of dense clouds
     stamps: list[float] = field(default_factory=list)
     clouds: list[Cloud] = field(default_factory=list)
 
@@ -148,6 +150,12 @@ def _add_cloud(content: BagContent, topic: str, message: Any) -> int:
     if clouds.frame != frame:
         raise WrongCloudError(f"clouds of {topic} in {clouds.frame} and {frame}")
     cloud = read_cloud(message)
+    total = len(cloud.positions)
+    if total > MOST_OF_A_CLOUD:  # of a scanner or a depth camera
+        step = -(-total // MOST_OF_A_CLOUD)
+        ids = None if cloud.ids is None else cloud.ids[::step].copy()
+        cloud = Cloud(cloud.positions[::step].copy(), ids)
+        clouds.thinned += total - len(cloud.positions)
     clouds.has_ids = clouds.has_ids or id_field(message) is not None
     clouds.stamps.append(_stamp(message.header))
     clouds.clouds.append(cloud)
