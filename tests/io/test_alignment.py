@@ -15,7 +15,8 @@ from groundmap.errors import InputError, NoGroundPlaneError
 from groundmap.io import read_views
 from groundmap.io.alignment import ScalePoints, align
 from groundmap.io.log import ViewLog
-from sparse_scene import colmap_binary, make_scene
+from sparse_binaries import colmap_binary
+from sparse_scene import make_scene
 
 
 def log_of(folder: Path, *, tilt_degrees: float = 0.0, views: int = 12) -> ViewLog:
