@@ -225,3 +225,10 @@ def test_absurd_depths_and_counts_are_refused_at_once(
     (tmp_path / file).write_bytes(data)
     with pytest.raises(FileFormatError, match=file):
         read_views(tmp_path)
+
+
+def test_a_header_of_names_is_skipped(tmp_path: Path) -> None:
+    files = sparse_texts.orbslam(SCENE)
+    names = b"timestamp tx ty tz qx qy qz qw\n"
+    files["KeyFrameTrajectory.txt"] = names + files["KeyFrameTrajectory.txt"]
+    assert pairs_of(opened(write(files, tmp_path / "map"))) == set(SCENE.pairs)
