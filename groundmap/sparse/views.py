@@ -45,7 +45,8 @@ class SparseViews:
         self._covariance = landmark_covariance(sparse, point_noise=point_noise)
         self._T_map_world = np.eye(4) if _is_rep103(sparse) else T_REP103_OPTICAL
         self._wide = _wide_cameras(sparse)
-        self._rigs = [_rigs(sparse, number) for number in range(len(sparse.cameras))]
+        pairs = zip(sparse.cameras, _borders(sparse).tolist(), strict=True)
+        self._rigs = [_rigs(camera, border) for camera, border in pairs]
         self._up = _up(sparse)
         self._order = _order(sparse)
 
@@ -174,23 +175,31 @@ def _wide_cameras(sparse: SparseMap) -> Bools:
     return wide
 
 
-def _border(sparse: SparseMap, number: int) -> float:
-    """Return the tangent of the borders of a camera's image: the file's, or of its sightings."""
-    known = sparse.cameras[number].border
-    if known is not None:
-        return min(known, WIDEST_BORDER)
+def _borders(sparse: SparseMap) -> Floats:
+    """Return the tangent of the borders of each image: the file's, or that of its sightings."""
+    known = [camera.border for camera in sparse.cameras]
+    borders = np.array([0.0 if border is None else border for border in known])
+    if not all(known):
+        borders = np.where(borders > 0, borders, _seen_borders(sparse))
+    return np.minimum(np.where(borders > 0, borders, USUAL_BORDER), WIDEST_BORDER)
+
+
+def _seen_borders(sparse: SparseMap) -> Floats:
+    """Return the largest tangent of the sightings of each camera; 0 for none."""
     assert sparse.camera_of is not None
-    own = sparse.camera_of[sparse.view_of] == number
-    rotations = sparse.T_world_camera[sparse.view_of[own], :3, :3]
-    offsets = sparse.offsets_from_cameras()[own]
-    x, _, z = np.einsum("ki,kij->jk", offsets, rotations)
-    tangents = np.abs(x[z > 0] / z[z > 0])
-    return float(min(tangents.max(initial=0.0), WIDEST_BORDER)) or USUAL_BORDER
+    rotations = sparse.T_world_camera[:, :3, :3]
+    offsets = sparse.offsets_from_cameras()
+    x = np.einsum("ki,ki->k", offsets, rotations[sparse.view_of, :, 0])
+    z = np.einsum("ki,ki->k", offsets, rotations[sparse.view_of, :, 2])
+    ahead = z > 0
+    widest = np.zeros(len(sparse.cameras))
+    cameras = sparse.camera_of[sparse.view_of[ahead]]
+    np.maximum.at(widest, cameras, np.abs(x[ahead] / z[ahead]))
+    return widest
 
 
-def _rigs(sparse: SparseMap, number: int) -> tuple[StereoRig, StereoRig]:
+def _rigs(camera: Camera, border: float) -> tuple[StereoRig, StereoRig]:
     """Return rigs with the borders of a camera, and of the same camera on its side."""
-    camera, border = sparse.cameras[number], _border(sparse, number)
     ratio = camera.height / camera.width if camera.width and camera.height else 1.0
     return _rig(camera, border), _rig(camera, border * ratio)
 
