@@ -98,11 +98,6 @@ def align(
         More than one of the options that give the scale, or one that is not above 0.
     NoGroundPlaneError
         The ground is needed, and too few features lie on a plane below the cameras.
-
-    Examples
-    --------
-    >>> log = groundmap.read_views("sparse/0")  # doctest: +SKIP
-    >>> views = align(log, camera_height=1.65)  # doctest: +SKIP
     """
     given = {"scale": scale, "camera_height": camera_height, "scale_points": scale_points}
     names = [name for name, value in given.items() if value is not None]

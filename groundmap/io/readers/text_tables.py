@@ -175,7 +175,8 @@ def read_words(path: Path) -> tuple[Floats, Ints, Ints]:
         A word that is not a number.
     """
     words: list[str] = []
-    counts, lines = [], []
+    counts: list[int] = []
+    lines: list[int] = []
     with open_rows(path) as stream:
         for number, line in enumerate(stream, start=1):
             row = _words(line)
