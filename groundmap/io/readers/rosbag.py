@@ -113,6 +113,7 @@ def _assemble(path: Path, content: BagContent, topic: str) -> SparseMap:
     notes = [
         f"clouds of {topic} in {clouds.frame}, poses in {content.tree.chain(clouds.frame)[-1]}"
     ]
+    notes += content.notes
     others = [name for name in content.clouds if name != topic]
     if others:
         notes.append(f"other clouds are not used: {', '.join(others)}")

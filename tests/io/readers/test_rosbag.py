@@ -16,7 +16,15 @@ from groundmap.io import read_views
 from groundmap.io.readers.base import SparseMapLog
 from groundmap.io.readers.transforms import TransformTree
 from groundmap.view.frames import T_REP103_OPTICAL
-from sparse_bag import POINTS, cloud, messages, write_bag1, write_bag2
+from sparse_bag import (
+    OPTICAL,
+    POINTS,
+    cloud,
+    messages,
+    pose_stamped,
+    write_bag1,
+    write_bag2,
+)
 
 
 @pytest.mark.parametrize("storage", ["sqlite3", "mcap"])
@@ -118,3 +126,16 @@ def test_dense_clouds_are_thinned_and_counted(tmp_path: Path) -> None:
     assert isinstance(log, SparseMapLog)
     assert log.sparse.dropped["points_thinned_out"] == count - len(range(0, count, 3))
     assert "/points" in log.sparse.notes[1]
+
+
+def test_a_single_topic_of_poses_places_clouds_that_nothing_else_places(tmp_path: Path) -> None:
+    found = []
+    for time in (1.0, 2.0):
+        message = pose_stamped(time, "world", (time, 0.0, 1.5), OPTICAL)
+        found.append(("/pose", "geometry_msgs/msg/PoseStamped", message, time))
+        found.append(("/points", "sensor_msgs/msg/PointCloud2", cloud(time, "camera"), time))
+    log = read_views(write_bag2(tmp_path / "bag", found, "mcap"))
+    assert isinstance(log, SparseMapLog)
+    npt.assert_allclose(log.sparse.centres, [(1, 0, 1.5), (2, 0, 1.5)], atol=1e-12)
+    npt.assert_allclose(log.sparse.landmarks[0], (6.0, 0.0, 0.5), atol=1e-6)
+    assert "/pose is taken as the pose of camera" in log.sparse.notes
