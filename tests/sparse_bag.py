@@ -41,6 +41,20 @@ def transform(
     )
 
 
+def pose_stamped(
+    time: float, frame: str, place: tuple[float, float, float],
+    turn: tuple[float, float, float, float],
+) -> Any:  # fmt: skip
+    x, y, z, w = turn
+    return TYPES["geometry_msgs/msg/PoseStamped"](
+        header=header(time, frame),
+        pose=TYPES["geometry_msgs/msg/Pose"](
+            position=TYPES["geometry_msgs/msg/Point"](*place),
+            orientation=TYPES["geometry_msgs/msg/Quaternion"](x, y, z, w),
+        ),
+    )
+
+
 def cloud(time: float, frame: str) -> Any:
     dtype = np.dtype(
         {

@@ -14,14 +14,16 @@ from groundmap.io.columns import KINDS, PIXEL_FIELDS, PLACE_FIELDS, Kind, Noise
 from groundmap.io.feature_tables import FeatureTable
 from groundmap.io.rig import IMAGE_KEYS, GivenRig
 from groundmap.sparse.cameras import USUAL_FOCAL_PX
-from groundmap.sparse.covariance import bearing_information, invert_information
+from groundmap.sparse.covariance import (
+    BEARING_NOISE,
+    bearing_information,
+    invert_information,
+    measured_covariance,
+)
 from groundmap.view.stereo_rig import StereoRig
 
 NO_BASELINE = 1e-6  # [m], of positions that no second image bounds
 WIDEST_BORDER = 20.0  # tangent
-# Of positions without a rig that no second view confirms: standard deviations along the ray, as a
-# share of the depth squared [1/m], and across it [rad].
-DEPTH_NOISE, BEARING_NOISE = 0.005, 1.0 / USUAL_FOCAL_PX
 
 
 def rig_and_noise(
@@ -127,20 +129,3 @@ class TrackNoise:
             rotation = self._rotations[rows["view"][0]]
             covariance[known] = rotation.T @ self._covariance[place[known]] @ rotation
         return covariance
-
-
-def measured_covariance(xyz: Floats) -> Floats:
-    """Return the covariance of measured positions, shape (..., 3, 3) [m², camera].
-
-    Parameters
-    ----------
-    xyz : ndarray, shape (..., 3) [m, camera]
-    """
-    with np.errstate(over="ignore", invalid="ignore"):
-        squared = np.maximum(np.einsum("...i,...i->...", xyz, xyz), 1e-12)
-        rays = xyz[..., :, None] * xyz[..., None, :] / squared[..., None, None]
-        across = BEARING_NOISE**2 * squared
-        along = np.maximum(DEPTH_NOISE**2 * squared**2, across)
-        covariance: Floats = across[..., None, None] * np.eye(3)
-        covariance += (along - across)[..., None, None] * rays
-    return covariance

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -44,7 +45,8 @@ class SparseViews:
         self._covariance = landmark_covariance(sparse, point_noise=point_noise)
         self._T_map_world = np.eye(4) if _is_rep103(sparse) else T_REP103_OPTICAL
         self._wide = _wide_cameras(sparse)
-        self._rigs = [_rigs(sparse, number) for number in range(len(sparse.cameras))]
+        pairs = zip(sparse.cameras, _borders(sparse).tolist(), strict=True)
+        self._rigs = [_rigs(camera, border) for camera, border in pairs]
         self._up = _up(sparse)
         self._order = _order(sparse)
 
@@ -83,9 +85,12 @@ class SparseViews:
         covariance = rotation.T @ self._covariance[rows] @ rotation
         assert sparse.ids is not None
         T_map_base = self._T_map_world @ T_world_camera
-        if sparse.T_base_camera is not None and keep is None:
-            rig = StereoRig(**{**vars(rig), "T_base_camera": sparse.T_base_camera[view]})
-            T_map_base = T_map_base @ invert(sparse.T_base_camera[view])
+        if sparse.T_base_camera is not None:
+            # The camera may be turned against that of the file.
+            turn = invert(sparse.T_world_camera[view]) @ T_world_camera
+            T_base_camera = sparse.T_base_camera[view] @ turn
+            rig = replace(rig, T_base_camera=T_base_camera)
+            T_map_base = T_map_base @ invert(T_base_camera)
         return View(
             T_map_base=T_map_base,
             rig=rig,
@@ -121,7 +126,7 @@ def _name_key(name: str) -> tuple[list[tuple[int, str]], str]:
     """Return a key that sorts ``image2`` before ``image10``, and pairs of a rig side by side."""
     base = name.replace("\\", "/").rpartition("/")[2]
     parts = DIGITS.split(base)
-    return [(int(part[-18:]), part) if part.isdigit() else (-1, part) for part in parts], name
+    return [(int(part[-18:]), part) if part.isdecimal() else (-1, part) for part in parts], name
 
 
 def _is_rep103(sparse: SparseMap) -> bool:
@@ -170,18 +175,62 @@ def _wide_cameras(sparse: SparseMap) -> Bools:
     return wide
 
 
-def _border(sparse: SparseMap, number: int) -> float:
-    """Return the tangent of the borders of a camera's image: the file's, or of its sightings."""
-    known = sparse.cameras[number].border
-    if known is not None:
-        return min(known, WIDEST_BORDER)
+def _borders(sparse: SparseMap) -> Floats:
+    """Return the tangent of the borders of each image: the file's, or that of its sightings."""
+    known = [camera.border for camera in sparse.cameras]
+    borders = np.array([0.0 if border is None else border for border in known])
+    if not all(known):
+        borders = np.where(borders > 0, borders, _seen_borders(sparse))
+    return np.minimum(np.where(borders > 0, borders, USUAL_BORDER), WIDEST_BORDER)
+
+
+def _seen_borders(sparse: SparseMap) -> Floats:
+    """Return the largest tangent of the sightings of each camera; 0 for none."""
     assert sparse.camera_of is not None
-    own = sparse.camera_of[sparse.view_of] == number
-    rotations = sparse.T_world_camera[sparse.view_of[own], :3, :3]
-    offsets = sparse.offsets_from_cameras()[own]
-    x, _, z = np.einsum("ki,kij->jk", offsets, rotations)
-    tangents = np.abs(x[z > 0] / z[z > 0])
-    return float(min(tangents.max(initial=0.0), WIDEST_BORDER)) or USUAL_BORDER
+    rotations = sparse.T_world_camera[:, :3, :3]
+    offsets = sparse.offsets_from_cameras()
+    x = np.einsum("ki,ki->k", offsets, rotations[sparse.view_of, :, 0])
+    z = np.einsum("ki,ki->k", offsets, rotations[sparse.view_of, :, 2])
+    ahead = z > 0
+    widest = np.zeros(len(sparse.cameras))
+    cameras = sparse.camera_of[sparse.view_of[ahead]]
+    np.maximum.at(widest, cameras, np.abs(x[ahead] / z[ahead]))
+    return widest
+
+
+def _rigs(camera: Camera, border: float) -> tuple[StereoRig, StereoRig]:
+    """Return rigs with the borders of a camera, and of the same camera on its side."""
+    ratio = camera.height / camera.width if camera.width and camera.height else 1.0
+    return _rig(camera, border), _rig(camera, border * ratio)
+
+
+def upright(T_world_camera: Floats, up: Floats) -> tuple[Floats, int]:
+    """Return a camera's pose turned about its axis until -y is up, and the quarter turns.
+
+    Phones write portraits as landscapes on their side.
+
+    Parameters
+    ----------
+    T_world_camera : ndarray, shape (4, 4)
+    up : ndarray, shape (3,) [world]
+
+    Examples
+    --------
+    >>> upright(np.eye(4), np.array([1.0, 0.0, 0.0]))[1]
+    1
+    """
+    right, above = up @ T_world_camera[:3, 0], -up @ T_world_camera[:3, 1]
+    if max(abs(right), abs(above)) < LEAST_UPRIGHT:
+        return T_world_camera, 0
+    turns = int(np.rint(np.arctan2(right, above) / (np.pi / 2))) % 4
+    if not turns:
+        return T_world_camera, 0
+    x, y = T_world_camera[:3, 0], T_world_camera[:3, 1]
+    turned = T_world_camera.copy()
+    for _ in range(turns):
+        x, y = y, -x
+    turned[:3, 0], turned[:3, 1] = x, y
+    return turned, turns
 
 
 def _rigs(sparse: SparseMap, number: int) -> tuple[StereoRig, StereoRig]:

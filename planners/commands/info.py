@@ -11,10 +11,13 @@ import typer
 
 from groundmap import CellState
 from groundmap.io import FORMATS, LOADERS, load_map
-from groundmap.io.align import AlignedViews, align
+from groundmap.io.alignment import AlignedViews, align
 from groundmap.io.readers.base import SparseMapLog
-from planners.commands.console import JsonOption, emit, print_message
+from groundmap.io.readers.sniffing import head_of
+from planners.commands.console import MAP_HELP, JsonOption, emit, print_message
 from planners.commands.sources import FormatOption, GuessOption, describe_map, open_source
+
+ARCHIVE = b"PK\x03\x04"  # of a map with another suffix
 
 
 def info_command(
@@ -22,16 +25,16 @@ def info_command(
         Path,
         typer.Argument(
             metavar="PATH",
-            help="A map (.npz, .yaml of map_server, .map, .3dmap), or a source of views: a log, or "
-            "the map of a SLAM or SfM system.",
+            help=f"{MAP_HELP} Or a source of views: a log, or the map of a SLAM or SfM system.",
         ),
     ],
     format: FormatOption = None,
     guess_visibility: GuessOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Summarise a map (areas or voxels, bounds, memory, rule, poses), or a source of views."""
-    if format is None and path.suffix.lower() in LOADERS and not path.is_dir():
+    """Summarise a map (areas [m²] or voxels, bounds [m], rule, poses), or a source of views."""
+    is_map = path.suffix.lower() in LOADERS or head_of(path).startswith(ARCHIVE)
+    if format is None and is_map and not path.is_dir():
         emit(_describe_grid(path), as_json=as_json, title=f"map {path}")
         return
     source = open_source(path, format=format, guess_visibility=guess_visibility, level=False)

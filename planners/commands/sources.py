@@ -13,7 +13,7 @@ import typer
 from groundmap import View, read_views
 from groundmap.arrays import Floats
 from groundmap.errors import InputError, NoGroundPlaneError
-from groundmap.io.align import AlignedViews, ScalePoints, align, is_metric
+from groundmap.io.alignment import AlignedViews, ScalePoints, align, is_metric
 from groundmap.io.log import ViewLog
 from groundmap.io.readers.base import SparseMapLog
 

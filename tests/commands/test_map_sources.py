@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from command_line import run
-from sparse_scene import colmap_binary, make_scene
+from sparse_binaries import colmap_binary
+from sparse_scene import make_scene
 
 
 def model(folder: Path, *, tilt_degrees: float = 0.0) -> Path:

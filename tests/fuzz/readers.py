@@ -17,7 +17,7 @@ from fuzz.draw import Draw
 from fuzz.mutate import damaged, damaged_bytes
 from fuzz.samples import Files
 from groundmap import CellState, ConfidenceGrid, load_map, read_views
-from groundmap.io.align import align
+from groundmap.io.alignment import align
 from groundmap.io.movingai_scen import read_movingai_scen
 from groundmap.simulate import drive
 from planners import Roadmap

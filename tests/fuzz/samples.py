@@ -12,7 +12,9 @@ import numpy as np
 from PIL import Image
 
 import sparse_bag
+import sparse_binaries
 import sparse_scene
+import sparse_texts
 from groundmap import ConfidenceGrid
 from groundmap.grid.fusion import Capped
 from planners import PlanningProblem, Roadmap
@@ -262,14 +264,14 @@ def text_maps() -> dict[str, Files]:
     """Return small maps of SLAM and SfM systems in text, by the name of their target."""
     scene = sparse_scene.make_scene(views=3, landmarks=15)
     return {
-        "map-bal": sparse_scene.bal(scene),
-        "map-bundler": sparse_scene.bundler(scene),
-        "map-colmap-text": sparse_scene.colmap_text(scene),
-        "map-meshroom": sparse_scene.meshroom(scene),
-        "map-nvm": sparse_scene.nvm(scene),
-        "map-openmvg-json": sparse_scene.openmvg_json(scene),
-        "map-opensfm": sparse_scene.opensfm(scene),
-        "map-orbslam": sparse_scene.orbslam(scene),
+        "map-bal": sparse_texts.bal(scene),
+        "map-bundler": sparse_texts.bundler(scene),
+        "map-colmap-text": sparse_texts.colmap_text(scene),
+        "map-meshroom": sparse_texts.meshroom(scene),
+        "map-nvm": sparse_texts.nvm(scene),
+        "map-openmvg-json": sparse_texts.openmvg_json(scene),
+        "map-opensfm": sparse_texts.opensfm(scene),
+        "map-orbslam": sparse_texts.orbslam(scene),
     }
 
 
@@ -281,12 +283,12 @@ def binary_maps() -> dict[str, Files]:
         "map-bag-mcap": sparse_bag.files_of(sparse_bag.messages(), "mcap"),
         "map-bag-ros1": sparse_bag.ros1_file(),
         "map-bag-sqlite": sparse_bag.files_of(sparse_bag.messages(), "sqlite3"),
-        "map-colmap-binary": sparse_scene.colmap_binary(scene),
-        "map-openmvg-binary": sparse_scene.openmvg_binary(scene),
-        "map-openmvs": sparse_scene.openmvs(scene),
-        "map-rtabmap": sparse_scene.rtabmap(scene),
-        "map-stella-msgpack": sparse_scene.stella_msgpack(scene),
-        "map-stella-sqlite": sparse_scene.stella_sqlite(scene),
+        "map-colmap-binary": sparse_binaries.colmap_binary(scene),
+        "map-openmvg-binary": sparse_binaries.openmvg_binary(scene),
+        "map-openmvs": sparse_binaries.openmvs(scene),
+        "map-rtabmap": sparse_binaries.rtabmap(scene),
+        "map-stella-msgpack": sparse_binaries.stella_msgpack(scene),
+        "map-stella-sqlite": sparse_binaries.stella_sqlite(scene),
     }
 
 
@@ -295,6 +297,6 @@ def unseen_map() -> Files:
     scene = sparse_scene.make_scene(views=3, landmarks=15)
     lines = [f"{x} {y} {z}\n" for x, y, z in scene.landmarks.tolist()]
     return {
-        "KeyFrameTrajectory.txt": sparse_scene.tum(scene),
+        "KeyFrameTrajectory.txt": sparse_texts.tum(scene),
         "MapPoints.txt": "".join(lines).encode(),
     }

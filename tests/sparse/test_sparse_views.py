@@ -116,3 +116,21 @@ def test_a_sparse_map_whose_world_has_z_up_keeps_its_axes() -> None:
     pose[:3, 3] = 1.0, 2.0, 3.0
     [view] = SparseViews(replace(sparse, T_world_camera=pose[None]))
     npt.assert_allclose(view.T_map_camera, pose)
+
+
+def test_a_camera_on_its_side_or_a_sphere_does_not_turn_the_robot() -> None:
+    mounted = T_REP103_OPTICAL @ np.array(
+        [(0.0, 1.0, 0.0, 0.2), (-1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0)]
+    )
+    base = np.eye(4)
+    base[:3, 3] = 5.0, 6.0, 0.0
+    for camera in (Camera(model="flat"), equirectangular("sphere", 1920, 960)):
+        sparse = replace(
+            all_around(camera),
+            T_world_camera=(base @ mounted)[None],
+            T_base_camera=mounted[None],
+            up=np.array([0.0, 0.0, 1.0]),
+        )
+        for view in SparseViews(sparse):
+            npt.assert_allclose(view.T_map_base, base, atol=1e-12)
+            assert view.T_map_camera[2, 1] < -0.99  # y of the camera points down

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from groundmap.arrays import Bools, Floats, Ints
 from groundmap.errors import FileFormatError
 
+DENSE, LEAST_SPAN = 8, 100_000  # ids that are so dense are looked up in a table
 LENGTH_TOLERANCE = 1e-2  # of a quaternion, which is normalised
 
 
@@ -80,12 +81,24 @@ def find_ids(ids: Ints, wanted: Ints) -> tuple[Ints, Bools]:
     ----------
     ids : ndarray of int, shape (n,)
     wanted : ndarray of int, shape (k,)
+
+    Examples
+    --------
+    >>> find_ids(np.array([9, 4]), np.array([4, 5, 9, -1]))
+    (array([1, 0, 0, 1]), array([ True, False,  True, False]))
     """
     if not len(ids):
         return np.zeros(len(wanted), dtype=np.int64), np.zeros(len(wanted), dtype=np.bool_)
+    lowest, span = int(ids.min()), int(ids.max()) - int(ids.min()) + 1
+    if span <= DENSE * len(ids) + LEAST_SPAN:  # a table of all ids is faster than a search
+        inside = (wanted >= lowest) & (wanted < lowest + span)
+        table = np.full(span, -1, dtype=np.int64)
+        table[ids - lowest] = np.arange(len(ids))
+        rows = table[np.where(inside, wanted - lowest, 0)]
+        return np.maximum(rows, 0), inside & (rows >= 0)
     order = np.argsort(ids, kind="stable")
-    place = np.searchsorted(ids, wanted, sorter=order).clip(max=len(ids) - 1)
-    rows = order[place]
+    ordered = ids[order]
+    rows = order[np.searchsorted(ordered, wanted).clip(max=len(ids) - 1)]
     return rows, ids[rows] == wanted
 
 

@@ -78,7 +78,7 @@ def is_bal(path: Path) -> bool:
     The rows are sniffed; the counts are checked when the file is read.
     """
     rows = first_rows(path) if path.suffix.lower() in {".txt", ".bal", ""} else []
-    if len(rows) < 2 or len(rows[0]) != 3 or not all(word.isdigit() for word in rows[0]):
+    if len(rows) < 2 or len(rows[0]) != 3 or not all(word.isdecimal() for word in rows[0]):
         return False
     first = rows[1 : 1 + min(int(rows[0][2][:9]), len(rows) - 1)]
-    return all(len(row) == 4 and row[0].isdigit() and row[1].isdigit() for row in first)
+    return all(len(row) == 4 and row[0].isdecimal() and row[1].isdecimal() for row in first)

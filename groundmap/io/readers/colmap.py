@@ -116,12 +116,12 @@ def _assemble(folder: Path, model: Model) -> SparseMap:
 
 def _notes(folder: Path) -> tuple[str, ...]:
     """Return a note about the other models of a project, which are numbered."""
-    if not folder.name.isdigit():
+    if not folder.name.isdecimal():
         return ()
     others = [
         place.name
         for place in sorted(folder.resolve().parent.iterdir())
-        if place.name.isdigit() and place.name != folder.name
+        if place.name.isdecimal() and place.name != folder.name
     ]
     if not others:
         return ()

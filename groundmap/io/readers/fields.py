@@ -158,6 +158,6 @@ def as_index(path: Path, text: str, what: str) -> int:
         For error messages.
     """
     digits = text.removeprefix("-")
-    if not (digits.isascii() and digits.isdigit()) or len(digits) > 18:
+    if not (digits.isascii() and digits.isdecimal()) or len(digits) > 18:
         raise FileFormatError(path, f"the number of a {what}", repr(text[:40]))
     return int(text)

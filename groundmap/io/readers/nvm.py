@@ -95,7 +95,7 @@ class _Lines:
 
     def count(self, what: str) -> int:
         text = self.next(f"the number of {what}").strip()
-        if not text.isdigit() or int(text[:12]) > self.left():
+        if not text.isdecimal() or int(text[:12]) > self.left():
             got = f"{text[:SHOWN]!r} before the last {self.left()} lines"
             raise FileFormatError(
                 self.path, f"an NVM file: a number of {what}", got, line=self.line

@@ -27,6 +27,7 @@ from groundmap.sparse.sparse_map import SparseMap
 # The second is that of a project of OpenDroneMap.
 RECONSTRUCTIONS = ("reconstruction.json", "opensfm/reconstruction.json")
 TRACKS = "tracks.csv"
+KEYS = (b'"cameras"', b'"shots"', b'"reference_lla"', b'"rig_instances"')
 VERSION = "OPENSFM_TRACKS_VERSION"
 SPHERICAL = {"spherical", "equirectangular"}
 USABLE_DOP = 1e4  # [m], dilution of precision above which there is no position
@@ -64,7 +65,7 @@ def _find(path: Path) -> Path | None:
     candidates = [path] if path.is_file() else [path / name for name in RECONSTRUCTIONS]
     for file in candidates:
         head = head_of(file).lstrip()
-        if head.startswith(b"[") and (b'"cameras"' in head or b'"shots"' in head):
+        if head.startswith(b"[") and any(key in head for key in KEYS):
             return file
     return None
 

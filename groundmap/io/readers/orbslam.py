@@ -17,6 +17,7 @@ import numpy as np
 from groundmap.arrays import Bools, Floats, Ints
 from groundmap.errors import FileFormatError
 from groundmap.io.readers.base import SparseMapLog
+from groundmap.io.readers.sniffing import files_in
 from groundmap.io.readers.text_tables import (
     TextKind,
     Trajectory,
@@ -28,7 +29,6 @@ from groundmap.io.readers.text_tables import (
 from groundmap.sparse.sparse_map import SparseMap
 
 STAMP_TOLERANCE = 5e-4  # [s]; keyframes are at least 30 ms apart
-MOST_FILES = 200  # of a folder that are looked at
 TRAJECTORIES: tuple[TextKind, ...] = ("tum", "stella", "euroc", "kitti")
 
 
@@ -68,8 +68,7 @@ def kinds_in(path: Path) -> dict[TextKind, list[Path]]:
     found: dict[TextKind, list[Path]] = {}
     if path.is_file() and kind_of(path) is None:
         return found
-    files = sorted(file for file in folder.iterdir() if file.is_file())
-    for file in files[:MOST_FILES]:
+    for file in files_in(folder):
         kind = kind_of(file)
         if kind is not None:
             found.setdefault(kind, []).append(file)

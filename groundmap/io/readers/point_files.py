@@ -88,7 +88,7 @@ def _vertex(path: Path, lines: list[list[str]]) -> tuple[int, list[tuple[str, st
     """Return the number of vertices, which must come first, and their fields."""
     elements = [row for row, line in enumerate(lines) if line[:1] == ["element"]]
     first = lines[elements[0]] if elements else []
-    if len(first) != 3 or first[1] != "vertex" or not first[2].isdigit():
+    if len(first) != 3 or first[1] != "vertex" or not first[2].isdecimal():
         raise FileFormatError(path, "vertices as the first element", " ".join(first) or "none")
     rest = lines[elements[0] + 1 : elements[1] if len(elements) > 1 else None]
     fields = []
@@ -110,7 +110,7 @@ def _pcd(path: Path, data: bytes) -> Floats:
             head[words[0]] = words[1:]
     names, form = head.get("FIELDS", []), (head.get("DATA") or [""])[0]
     points = (head.get("POINTS") or ["0"])[0]
-    if not points.isdigit():
+    if not points.isdecimal():
         raise FileFormatError(path, "a number of POINTS", repr(points))
     count = int(points[:18])
     if form == "ascii":

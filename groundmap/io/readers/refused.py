@@ -10,10 +10,9 @@ from pathlib import Path
 from groundmap.errors import FileFormatError
 from groundmap.files.opening import open_file
 from groundmap.io.readers.orbslam import TRAJECTORIES, kinds_in
-from groundmap.io.readers.sniffing import head_of
+from groundmap.io.readers.sniffing import IMAGES, head_of
 
 WANTED = "poses, landmarks, and which view saw which"
-IMAGES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp"}
 MOST_ENTRIES = 2000
 ATLAS_HINT = "Save the trajectory and the points with their keyframes: see docs/sources/orbslam.md."
 
@@ -101,8 +100,8 @@ def _text_tables(path: Path) -> Finding | None:
     kinds = kinds_in(path)
     tracks = [file.name for kind in TRAJECTORIES for file in kinds.get(kind, [])]
     points = [file.name for file in kinds.get("points", [])]
-    if path.is_file() and path.name not in tracks + points:
-        return None
+    if path.is_file():
+        tracks, points = ([path.name] * (path.name in names) for names in (tracks, points))
     if tracks:
         hint = "The landmarks, and which view saw which, are missing: give the map that the same "
         return f"a trajectory alone ({tracks[0]})", hint + "program saves, or see docs/sources."

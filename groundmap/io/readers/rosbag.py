@@ -21,6 +21,7 @@ from groundmap.io.readers.rosbag_content import CLOUD, BagContent, is_bag, read_
 from groundmap.io.readers.sniffing import head_of, matching_files
 from groundmap.io.readers.transforms import TransformTree
 from groundmap.sparse.cameras import Camera
+from groundmap.sparse.covariance import measured_covariance
 from groundmap.sparse.sparse_map import SparseMap
 from groundmap.view.frames import T_REP103_OPTICAL
 
@@ -28,8 +29,6 @@ METADATA, DESCRIPTION = "metadata.yaml", b"rosbag2_bagfile_information"
 BASES = ("base_link", "base_footprint", "base")
 UP = np.array([0.0, 0.0, 1.0])
 UPRIGHT = 0.7  # cosine of the angle between z of a sensor frame and z of the world
-MOST_POINTS = 20_000  # of a cloud that are used, evenly
-NOISE = 0.005  # standard deviation of a distance, as a share of its square [1/m]
 
 
 class RosbagLog(SparseMapLog):
@@ -99,7 +98,7 @@ class _View(NamedTuple):
 
 def _assemble(path: Path, content: BagContent, topic: str) -> SparseMap:
     clouds = content.clouds[topic]
-    dropped: Counter[str] = Counter()
+    dropped = Counter({"points_thinned_out": clouds.thinned})
     views = []
     for stamp, cloud in zip(clouds.stamps, clouds.clouds, strict=True):
         view = _view(content.tree, clouds.frame, stamp, cloud)
@@ -114,6 +113,7 @@ def _assemble(path: Path, content: BagContent, topic: str) -> SparseMap:
     notes = [
         f"clouds of {topic} in {clouds.frame}, poses in {content.tree.chain(clouds.frame)[-1]}"
     ]
+    notes += content.notes
     others = [name for name in content.clouds if name != topic]
     if others:
         notes.append(f"other clouds are not used: {', '.join(others)}")
@@ -127,9 +127,6 @@ def _view(tree: TransformTree, frame: str, stamp: float, cloud: Cloud) -> _View 
     chain = tree.chain(frame)
     base = next((name for name in BASES if name in chain), None)
     T_base_sensor = None if base is None else tree.within(frame, base, stamp)
-    if len(cloud.positions) > MOST_POINTS:
-        step = -(-len(cloud.positions) // MOST_POINTS)
-        cloud = Cloud(cloud.positions[::step], None if cloud.ids is None else cloud.ids[::step])
     if not _is_optical(frame, pose):  # x forward, z up
         pose = pose @ T_REP103_OPTICAL
         cloud = Cloud(cloud.positions @ T_REP103_OPTICAL[:3, :3], cloud.ids)
@@ -150,7 +147,9 @@ def _sparse(views: list[_View], dropped: Counter[str], notes: tuple[str, ...]) -
     local = [view.cloud.positions[keep] for view, keep in zip(views, finite, strict=True)]
     owners = np.repeat(np.arange(len(views)), [len(points) for points in local])
     positions = np.concatenate(local)
-    world = np.einsum("kij,kj->ki", poses[owners, :3, :3], positions) + poses[owners, :3, 3]
+    with np.errstate(over="ignore", invalid="ignore"):  # the map drops what is too far
+        world = np.einsum("kij,kj->ki", poses[owners, :3, :3], positions) + poses[owners, :3, 3]
+        covariance = measured_covariance(world - poses[owners, :3, 3])
     mounted = [view.T_base_camera for view in views if view.T_base_camera is not None]
     # A sensor that sees to all sides is split into flat views.
     camera = Camera(model="point cloud", projection="fisheye")
@@ -164,7 +163,7 @@ def _sparse(views: list[_View], dropped: Counter[str], notes: tuple[str, ...]) -
         names=tuple(f"{view.stamp:.9f}" for view in views),
         timestamps=np.array([view.stamp for view in views]),
         cameras=(camera,),
-        covariance=_covariance(positions, poses[owners, :3, :3]),
+        covariance=covariance,
         metric=True,
         up=UP,
         T_base_camera=np.array(mounted) if len(mounted) == len(views) else None,
@@ -179,14 +178,3 @@ def _ids(views: list[_View], finite: list[Any]) -> Any:
         for view, keep in zip(views, finite, strict=True)
     ]
     return np.concatenate([given[keep] for given, keep in zip(ids, finite, strict=True)])
-
-
-def _covariance(positions: Floats, rotations: Floats) -> Floats:
-    """Return the covariance of distances that are measured: along the ray by distance squared."""
-    squared = np.maximum(np.einsum("ki,ki->k", positions, positions), 1e-12)
-    rays = np.einsum("kij,kj->ki", rotations, positions) / np.sqrt(squared)[:, None]
-    along, across = NOISE**2 * squared**2, (1.0 / 500.0) ** 2 * squared
-    along = np.maximum(along, across)
-    covariance: Floats = across[:, None, None] * np.eye(3)
-    covariance += (along - across)[:, None, None] * np.einsum("ki,kj->kij", rays, rays)
-    return covariance

@@ -25,7 +25,9 @@ CLOUD = "sensor_msgs/msg/PointCloud2"
 TF = "tf2_msgs/msg/TFMessage"
 OLD_TF = "tf/msg/tfMessage"
 ODOMETRY = "nav_msgs/msg/Odometry"
-WANTED = {CLOUD, TF, OLD_TF, ODOMETRY}
+POSE = "geometry_msgs/msg/PoseStamped"
+WANTED = {CLOUD, TF, OLD_TF, ODOMETRY, POSE}
+MOST_OF_A_CLOUD = 20_000  # points that are used, evenly
 MOST_POINTS = 50_000_000  # of all clouds of a bag
 SHOWN_TOPICS = 12
 # Exceptions of the library and of its decoders for damaged bags, collected by damaging bags.
@@ -40,6 +42,7 @@ class Clouds:
 
     frame: str
     has_ids: bool = False
+    thinned: int = 0  #: number of points that were left out of dense clouds
     stamps: list[float] = field(default_factory=list)
     clouds: list[Cloud] = field(default_factory=list)
 
@@ -56,6 +59,7 @@ class BagContent:
     tree: TransformTree = field(default_factory=TransformTree)
     clouds: dict[str, Clouds] = field(default_factory=dict)
     topics: list[str] = field(default_factory=list)  #: each with its type and number of messages
+    notes: list[str] = field(default_factory=list)
 
 
 def is_bag(path: Path) -> bool:
@@ -109,6 +113,7 @@ def _read(path: Path, reader: Any, content: BagContent) -> None:
     content.topics = _describe(connections)
     wanted = [connection for connection in connections if connection.msgtype in WANTED]
     odometry: list[tuple[str, str, float, Floats]] = []
+    poses: dict[str, list[tuple[str, float, Floats]]] = {}
     points = 0
     for connection, _, raw in reader.messages(connections=wanted) if wanted else ():
         message = reader.deserialize(raw, connection.msgtype)
@@ -120,6 +125,10 @@ def _read(path: Path, reader: Any, content: BagContent) -> None:
             pose = _pose(message.pose.pose.position, message.pose.pose.orientation)
             frames = (_frame(message.header.frame_id), _frame(message.child_frame_id))
             odometry.append((*frames, _stamp(message.header), pose))
+        elif connection.msgtype == POSE:
+            pose = _pose(message.pose.position, message.pose.orientation)
+            entry = (_frame(message.header.frame_id), _stamp(message.header), pose)
+            poses.setdefault(connection.topic, []).append(entry)
         else:
             fixed = connection.topic.endswith("static")
             for transform in message.transforms:
@@ -129,6 +138,21 @@ def _read(path: Path, reader: Any, content: BagContent) -> None:
     for parent, child, time, pose in odometry:
         if child and child not in placed:
             content.tree.add(parent, child, time, pose)
+    _place_clouds(content, poses)
+
+
+def _place_clouds(content: BagContent, poses: dict[str, list[tuple[str, float, Floats]]]) -> None:
+    """Take the only topic of poses as those of clouds whose frame nothing else places."""
+    if len(poses) != 1:
+        return
+    [(topic, entries)] = poses.items()
+    for clouds in content.clouds.values():
+        worlds = {world for world, _, _ in entries}
+        if content.tree.has_parent(clouds.frame) or clouds.frame in worlds:
+            continue
+        for world, time, pose in entries:
+            content.tree.add(world, clouds.frame, time, pose)
+        content.notes.append(f"{topic} is taken as the pose of {clouds.frame}")
 
 
 def _describe(connections: list[Any]) -> list[str]:
@@ -148,6 +172,12 @@ def _add_cloud(content: BagContent, topic: str, message: Any) -> int:
     if clouds.frame != frame:
         raise WrongCloudError(f"clouds of {topic} in {clouds.frame} and {frame}")
     cloud = read_cloud(message)
+    total = len(cloud.positions)
+    if total > MOST_OF_A_CLOUD:  # of a scanner or a depth camera
+        step = -(-total // MOST_OF_A_CLOUD)
+        ids = None if cloud.ids is None else cloud.ids[::step].copy()
+        cloud = Cloud(cloud.positions[::step].copy(), ids)
+        clouds.thinned += total - len(cloud.positions)
     clouds.has_ids = clouds.has_ids or id_field(message) is not None
     clouds.stamps.append(_stamp(message.header))
     clouds.clouds.append(cloud)
@@ -172,7 +202,9 @@ def _pose(position: Any, orientation: Any) -> Floats:
     quaternion = [orientation.x, orientation.y, orientation.z, orientation.w]
     values = np.array([position.x, position.y, position.z, *quaternion], dtype=np.float64)
     # As in tf, a quaternion is normalised, however long it is.
-    if not np.isfinite(values).all() or not 0.1 < np.linalg.norm(values[3:]) < 10.0:
+    with np.errstate(over="ignore"):
+        length = float(np.linalg.norm(values[3:]))
+    if not np.isfinite(values).all() or not 0.1 < length < 10.0:
         raise WrongCloudError(f"a pose of {values.tolist()}")
     pose = np.eye(4)
     pose[:3, :3] = Rotation.from_quat(values[3:]).as_matrix()

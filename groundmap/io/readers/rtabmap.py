@@ -22,6 +22,7 @@ from groundmap.io.readers.base import SparseMapLog
 from groundmap.io.readers.rtabmap_calibration import Calibration, read_calibration
 from groundmap.io.readers.sniffing import head_of, single_file
 from groundmap.sparse.cameras import Camera
+from groundmap.sparse.covariance import measured_covariance
 from groundmap.sparse.sparse_map import SparseMap
 
 EXPECTED = "a database of RTAB-Map"
@@ -29,9 +30,6 @@ TABLES = {"Node", "Data", "Admin"}
 FEATURES = ("Feature", "Map_Node_Word")  # names of the table, since 0.12 and before
 INTERMEDIATE = -9  # weight of nodes that are only part of the trajectory
 MOST_POSES = 10_000_000
-# Standard deviation of a depth, as a share of its square [1/m]: structured light and stereo with a
-# baseline of 7.5 cm and a disparity that is certain to a fifth of a pixel.
-DEPTH_NOISE = 0.005
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -202,8 +200,11 @@ def _assemble(
     T_world_base = np.array([node.T_world_base for node in nodes]).reshape(-1, 4, 4)
     T_base_camera = np.array([node.calibration.T_base_camera for node in nodes]).reshape(-1, 4, 4)
     poses = T_world_base @ T_base_camera
-    world = np.einsum("kij,kj->ki", T_world_base[owners, :3, :3], features.positions)
-    world += T_world_base[owners, :3, 3]
+    noise = np.array([node.calibration.camera.bearing_noise for node in nodes])
+    with np.errstate(over="ignore", invalid="ignore"):  # the map drops what is too far
+        world = np.einsum("kij,kj->ki", T_world_base[owners, :3, :3], features.positions)
+        world += T_world_base[owners, :3, 3]
+        covariance = measured_covariance(world - poses[owners, :3, 3], noise[owners])
     stamps = np.array([node.stamp for node in nodes])
     return SparseMap(
         system="RTAB-Map",
@@ -217,22 +218,10 @@ def _assemble(
         cameras=tuple(node.calibration.camera for node in nodes) or (Camera(model="none"),),
         camera_of=np.arange(len(nodes)),
         pixels=features.pixels,
-        covariance=_covariance(world, poses, owners, nodes),
+        covariance=covariance,
         metric=True,
         up=UP,
         T_base_camera=T_base_camera,
         dropped=+dropped,
         notes=notes,
     )
-
-
-def _covariance(world: Floats, poses: Floats, owners: Ints, nodes: list[_Node]) -> Floats:
-    """Return the covariance of measured depths: along the ray by depth squared, across by pixel."""
-    offsets = world - poses[owners, :3, 3]
-    squared = np.maximum(np.einsum("ki,ki->k", offsets, offsets), 1e-12)
-    rays = np.einsum("ki,kj->kij", offsets, offsets) / squared[:, None, None]
-    noise = np.array([node.calibration.camera.bearing_noise for node in nodes])[owners]
-    along, across = DEPTH_NOISE**2 * squared**2, noise**2 * squared
-    covariance: Floats = across[:, None, None] * np.eye(3)
-    covariance += (along - across)[:, None, None] * rays
-    return covariance

@@ -10,7 +10,8 @@ from groundmap.errors import FileFormatError
 from groundmap.files.opening import open_file
 
 HEAD_BYTES = 4096
-MOST_FILES = 200  # of a folder that are looked at
+MOST_FILES = 300  # of a folder that are looked at, beside images
+IMAGES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp"}
 
 
 def head_of(path: Path) -> bytes:
@@ -37,8 +38,13 @@ def matching_files(path: Path, is_kind: Callable[[Path], bool]) -> list[Path]:
         return [path] if is_kind(path) else []
     if not path.is_dir():
         return []
-    files = sorted(islice((entry for entry in path.iterdir() if entry.is_file()), MOST_FILES))
-    return [file for file in files if is_kind(file)]
+    return [file for file in files_in(path) if is_kind(file)]
+
+
+def files_in(folder: Path) -> list[Path]:
+    """Return the first files of a folder that are no images, sorted."""
+    entries = (entry for entry in folder.iterdir() if entry.suffix.lower() not in IMAGES)
+    return sorted(islice((entry for entry in entries if entry.is_file()), MOST_FILES))
 
 
 def single_file(path: Path, is_kind: Callable[[Path], bool]) -> Path | None:

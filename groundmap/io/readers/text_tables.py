@@ -53,6 +53,23 @@ def _words(line: str) -> list[str]:
     return line.partition("#")[0].replace(",", " ").replace(";", " ").split()
 
 
+def is_header(row: list[str]) -> bool:
+    """Return whether a row has names instead of numbers.
+
+    Examples
+    --------
+    >>> is_header(["timestamp", "tx", "ty"]), is_header(["0.1", "2", "x"])
+    (True, False)
+    """
+    for word in row:
+        try:
+            float(word)
+        except ValueError:
+            continue
+        return False
+    return True
+
+
 def kind_of(path: Path) -> TextKind | None:
     """Return what a text file contains, by the numbers of its first rows; None if unknown."""
     if path.suffix.lower() not in SUFFIXES:
@@ -63,8 +80,10 @@ def kind_of(path: Path) -> TextKind | None:
     if rows[0][0].lower() in ("ply", "v", "vn", "o", "g", "mtllib") or path.suffix == ".pcd":
         return "points" if _is_point_file(path, rows) else None
     try:
-        table = [list(map(float, row)) for row in rows]
+        table = [list(map(float, row)) for row in rows[is_header(rows[0]) :]]
     except ValueError:
+        return None
+    if not table:
         return None
     widths = {len(row) for row in table}
     if widths in ({3}, {6}):
@@ -77,6 +96,11 @@ def kind_of(path: Path) -> TextKind | None:
 
 
 def _pose_kind(table: Floats) -> TextKind | None:
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _kind_by_width(table)
+
+
+def _kind_by_width(table: Floats) -> TextKind | None:
     width = table.shape[1]
     if width == 12:
         rotation = table.reshape(-1, 3, 4)[:, :, :3]
@@ -151,10 +175,13 @@ def read_words(path: Path) -> tuple[Floats, Ints, Ints]:
         A word that is not a number.
     """
     words: list[str] = []
-    counts, lines = [], []
+    counts: list[int] = []
+    lines: list[int] = []
     with open_rows(path) as stream:
         for number, line in enumerate(stream, start=1):
             row = _words(line)
+            if row and not counts and is_header(row):
+                continue
             if row:
                 words.extend(row)
                 counts.append(len(row))

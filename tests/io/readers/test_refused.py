@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-import sparse_scene
+import sparse_binaries
+import sparse_texts
 from groundmap.errors import FileFormatError
 from groundmap.io import read_views
 from groundmap.io.readers.base import SparseMapLog
@@ -29,11 +30,11 @@ def without(files: Files, *names: str) -> Files:
 
 
 REFUSED: dict[str, tuple[Files, str]] = {
-    "trajectory": ({"traj.txt": sparse_scene.tum(SCENE)}, r"a trajectory alone \(traj.txt\)"),
+    "trajectory": ({"traj.txt": sparse_texts.tum(SCENE)}, r"a trajectory alone \(traj.txt\)"),
     "kitti": ({"poses.txt": KITTI}, r"a trajectory alone \(poses.txt\)"),
     "points": ({"cloud.ply": PLY}, r"points alone \(cloud.ply\)"),
     "orbslam": (
-        {"KeyFrameTrajectory.txt": sparse_scene.tum(SCENE), "MapPoints.obj": POINTS},
+        {"KeyFrameTrajectory.txt": sparse_texts.tum(SCENE), "MapPoints.obj": POINTS},
         r"a trajectory \(KeyFrameTrajectory.txt\) and points \(MapPoints.obj\) without visibility.*"
         "--guess-visibility",
     ),
@@ -54,18 +55,18 @@ REFUSED: dict[str, tuple[Files, str]] = {
         "0 views without poses.*openMVG_main_SfM",
     ),
     "opensfm": (
-        without(sparse_scene.opensfm(SCENE), "tracks.csv"),
+        without(sparse_texts.opensfm(SCENE), "tracks.csv"),
         "no tracks.csv beside it.*copy it here",
     ),
     "colmap": (
-        without(sparse_scene.colmap_binary(SCENE), "points3D.bin"),
+        without(sparse_binaries.colmap_binary(SCENE), "points3D.bin"),
         "cameras.bin, images.bin, points3D.bin, got no points3D.bin",
     ),
     "atlas": ({"map.osa": b"22 serialization::archive 17 0 0"}, "an atlas of ORB-SLAM3"),
     "g2o": ({"graph.g2o": b"VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\n"}, "a pose graph without landmarks"),
     "database": (
         {
-            "database.db": sparse_scene.database_of(
+            "database.db": sparse_binaries.database_of(
                 [("CREATE TABLE two_view_geometries (a)", ()), ("CREATE TABLE images (a)", ())]
             )
         },
@@ -88,13 +89,13 @@ def test_a_known_file_that_cannot_serve_is_named(name: str, tmp_path: Path) -> N
 
 
 def test_the_file_itself_is_refused_like_its_folder(tmp_path: Path) -> None:
-    (tmp_path / "traj.txt").write_bytes(sparse_scene.tum(SCENE))
+    (tmp_path / "traj.txt").write_bytes(sparse_texts.tum(SCENE))
     with pytest.raises(FileFormatError, match=r"a trajectory alone \(traj.txt\)"):
         read_views(tmp_path / "traj.txt")
 
 
 def test_visibility_is_guessed_only_on_request_and_labelled(tmp_path: Path) -> None:
-    (tmp_path / "KeyFrameTrajectory.txt").write_bytes(sparse_scene.tum(SCENE))
+    (tmp_path / "KeyFrameTrajectory.txt").write_bytes(sparse_texts.tum(SCENE))
     lines = [f"v {x} {y} {z}" for x, y, z in SCENE.landmarks.tolist()]
     (tmp_path / "points.obj").write_text("\n".join(lines))
     log = read_views(tmp_path, guess_visibility=True)
@@ -106,7 +107,7 @@ def test_visibility_is_guessed_only_on_request_and_labelled(tmp_path: Path) -> N
 
 
 def test_a_rtabmap_database_without_optimised_poses_says_so(tmp_path: Path) -> None:
-    files = sparse_scene.rtabmap(SCENE, optimised=False)
+    files = sparse_binaries.rtabmap(SCENE, optimised=False)
     (tmp_path / "rtabmap.db").write_bytes(files["rtabmap.db"])
     log = read_views(tmp_path)
     assert isinstance(log, SparseMapLog)
@@ -118,14 +119,14 @@ def test_a_rtabmap_database_without_optimised_poses_says_so(tmp_path: Path) -> N
 def test_a_rtabmap_database_without_features_counts_its_nodes(tmp_path: Path) -> None:
     tables = ["Node (id, weight, stamp, pose)", "Data (id, calibration)", "Admin (version)"]
     statements = [(f"CREATE TABLE {table}", ()) for table in tables]
-    (tmp_path / "a.db").write_bytes(sparse_scene.database_of([*statements]))
+    (tmp_path / "a.db").write_bytes(sparse_binaries.database_of([*statements]))
     with pytest.raises(FileFormatError, match=r"0 nodes without 3-D features. The database is em"):
         read_views(tmp_path / "a.db")
 
 
 def test_a_locked_database_is_named(tmp_path: Path) -> None:
     path = tmp_path / "rtabmap.db"
-    path.write_bytes(sparse_scene.rtabmap(SCENE)["rtabmap.db"])
+    path.write_bytes(sparse_binaries.rtabmap(SCENE)["rtabmap.db"])
     connection = sqlite3.connect(path)
     connection.execute("BEGIN EXCLUSIVE")
     try:

@@ -4,18 +4,27 @@ from __future__ import annotations
 
 import bz2
 import struct
+import sys
 from pathlib import Path
 
 import numpy as np
 import numpy.testing as npt
 import pytest
 
-from groundmap.errors import FileFormatError
+from groundmap.errors import FileFormatError, InputError
 from groundmap.io import read_views
 from groundmap.io.readers.base import SparseMapLog
 from groundmap.io.readers.transforms import TransformTree
 from groundmap.view.frames import T_REP103_OPTICAL
-from sparse_bag import POINTS, cloud, messages, write_bag1, write_bag2
+from sparse_bag import (
+    OPTICAL,
+    POINTS,
+    cloud,
+    messages,
+    pose_stamped,
+    write_bag1,
+    write_bag2,
+)
 
 
 @pytest.mark.parametrize("storage", ["sqlite3", "mcap"])
@@ -93,3 +102,40 @@ def test_a_chunk_that_is_larger_than_it_states_is_refused(tmp_path: Path) -> Non
 def test_compressed_bags_are_read(tmp_path: Path) -> None:
     folder = write_bag2(tmp_path / "bag", messages(), "mcap", compressed=True)
     assert len(read_views(folder)) == 2
+
+
+def test_a_missing_library_is_named_with_its_installation(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = write_bag2(tmp_path / "bag", messages(), "mcap")
+    monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
+    with pytest.raises(InputError, match=r"rosbags .* got none. pip install 'groundmap\[bags\]'"):
+        read_views(folder)
+
+
+def test_dense_clouds_are_thinned_and_counted(tmp_path: Path) -> None:
+    found = messages()
+    dense = cloud(1.5, "camera_optical")
+    count = 50_000
+    dense.width, dense.row_step = count, 32 * count
+    dense.data = np.tile(dense.data[:32], count)
+    found.append(("/dense", "sensor_msgs/msg/PointCloud2", dense, 1.5))
+    for time in (1.6, 1.7, 1.8, 1.9):  # more messages than the other topic
+        found.append(("/dense", "sensor_msgs/msg/PointCloud2", cloud(time, "camera_optical"), time))
+    log = read_views(write_bag2(tmp_path / "bag", found, "sqlite3"))
+    assert isinstance(log, SparseMapLog)
+    assert log.sparse.dropped["points_thinned_out"] == count - len(range(0, count, 3))
+    assert "/points" in log.sparse.notes[1]
+
+
+def test_a_single_topic_of_poses_places_clouds_that_nothing_else_places(tmp_path: Path) -> None:
+    found = []
+    for time in (1.0, 2.0):
+        message = pose_stamped(time, "world", (time, 0.0, 1.5), OPTICAL)
+        found.append(("/pose", "geometry_msgs/msg/PoseStamped", message, time))
+        found.append(("/points", "sensor_msgs/msg/PointCloud2", cloud(time, "camera"), time))
+    log = read_views(write_bag2(tmp_path / "bag", found, "mcap"))
+    assert isinstance(log, SparseMapLog)
+    npt.assert_allclose(log.sparse.centres, [(1, 0, 1.5), (2, 0, 1.5)], atol=1e-12)
+    npt.assert_allclose(log.sparse.landmarks[0], (6.0, 0.0, 0.5), atol=1e-6)
+    assert "/pose is taken as the pose of camera" in log.sparse.notes

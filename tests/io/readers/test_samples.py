@@ -12,7 +12,7 @@ import pytest
 
 from groundmap.errors import FileFormatError
 from groundmap.io import read_views
-from groundmap.io.align import align
+from groundmap.io.alignment import align
 from groundmap.io.readers.base import SparseMapLog
 
 DATA = Path(__file__).parents[4] / "shared" / "data" / "sparse_maps"

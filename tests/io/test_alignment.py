@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import numpy.testing as npt
 import pytest
+from scipy.spatial.transform import Rotation
 
+from groundmap import fit_ground
 from groundmap.errors import InputError, NoGroundPlaneError
 from groundmap.io import read_views
-from groundmap.io.align import ScalePoints, align
+from groundmap.io.alignment import ScalePoints, align
 from groundmap.io.log import ViewLog
-from sparse_scene import colmap_binary, make_scene
+from sparse_binaries import colmap_binary
+from sparse_scene import make_scene
 
 
 def log_of(folder: Path, *, tilt_degrees: float = 0.0, views: int = 12) -> ViewLog:
@@ -93,3 +97,22 @@ def test_a_camera_height_needs_ground(tmp_path: Path) -> None:
         (folder / name).write_bytes(data)
     with pytest.raises(NoGroundPlaneError, match=r"give the scale by --scale or --scale-points"):
         align(read_views(folder), camera_height=1.0)
+
+
+def test_a_camera_that_looks_down_gets_a_level_base_on_the_ground(tmp_path: Path) -> None:
+    scene = make_scene(views=12, landmarks=300)
+    pitch = Rotation.from_rotvec([np.radians(-30.0), 0.0, 0.0]).as_matrix()
+    # Looking 30 degrees down, the camera still has the same landmarks before it.
+    pitched = replace(scene, rotations=scene.rotations @ pitch)
+    folder = tmp_path / "map"
+    folder.mkdir()
+    for name, data in colmap_binary(pitched).items():
+        (folder / name).write_bytes(data)
+    views = align(read_views(folder))
+    for view in fit_ground(views):
+        assert view.rig.T_base_camera[2, 3] == pytest.approx(1.5, abs=0.01)
+        npt.assert_allclose(view.T_map_base[2, :3], (0, 0, 1), atol=1e-9)
+        assert view.plane is not None
+        height = float(view.plane.height(view.rig.T_base_camera[:3, 3]))
+        assert height == pytest.approx(1.5, abs=0.05)
+        assert view.T_map_camera[2, 2] == pytest.approx(np.sin(np.radians(-30)), abs=0.01)

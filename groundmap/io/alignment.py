@@ -12,6 +12,7 @@ from groundmap.arrays import Floats, as_number
 from groundmap.errors import InputError, NoGroundPlaneError
 from groundmap.io.log import ViewLog
 from groundmap.io.readers.base import SparseMapLog
+from groundmap.settings import GroundSettings
 from groundmap.sparse.ground_estimate import GroundEstimate, estimate_ground, mean_up
 from groundmap.sparse.similarity import Similarity
 from groundmap.sparse.sparse_map import SparseMap
@@ -85,17 +86,18 @@ def align(
         Whether to turn the log so that the ground under its cameras is level; default: for sparse
         maps, unless their unit and their direction up are known.
 
+    Returns
+    -------
+    AlignedViews
+        Where the ground was found and the poses are those of cameras, each view has a level
+        ``base_link`` on it, however its camera is held.
+
     Raises
     ------
     InputError
         More than one of the options that give the scale, or one that is not above 0.
     NoGroundPlaneError
         The ground is needed, and too few features lie on a plane below the cameras.
-
-    Examples
-    --------
-    >>> log = groundmap.read_views("sparse/0")  # doctest: +SKIP
-    >>> views = align(log, camera_height=1.65)  # doctest: +SKIP
     """
     given = {"scale": scale, "camera_height": camera_height, "scale_points": scale_points}
     names = [name for name, value in given.items() if value is not None]
@@ -127,7 +129,16 @@ def align(
         vertical = ground.up if ground is not None else up if up is not None else mean_up(log)
         if vertical is not None:
             rotation = _level_rotation(log, vertical)
-    return AlignedViews(log, Similarity(scale=factor, rotation=rotation), ground, levelled=level)
+    base = _base_height(factor * ground.camera_height) if level and ground is not None else None
+    similarity = Similarity(scale=factor, rotation=rotation, camera_height=base)
+    return AlignedViews(log, similarity, ground, levelled=level)
+
+
+def _base_height(camera_height: float) -> float | None:
+    """Return a height of the cameras, if it is one in metres."""
+    usual = GroundSettings()
+    plausible = usual.lowest_camera <= camera_height <= usual.highest_camera
+    return camera_height if plausible else None
 
 
 def _level_rotation(log: ViewLog, up: Floats) -> Floats:
