@@ -233,42 +233,6 @@ def upright(T_world_camera: Floats, up: Floats) -> tuple[Floats, int]:
     return turned, turns
 
 
-def _rigs(sparse: SparseMap, number: int) -> tuple[StereoRig, StereoRig]:
-    """Return rigs with the borders of a camera, and of the same camera on its side."""
-    camera, border = sparse.cameras[number], _border(sparse, number)
-    ratio = camera.height / camera.width if camera.width and camera.height else 1.0
-    return _rig(camera, border), _rig(camera, border * ratio)
-
-
-def upright(T_world_camera: Floats, up: Floats) -> tuple[Floats, int]:
-    """Return a camera's pose turned about its axis until -y is up, and the quarter turns.
-
-    Phones write portraits as landscapes on their side.
-
-    Parameters
-    ----------
-    T_world_camera : ndarray, shape (4, 4)
-    up : ndarray, shape (3,) [world]
-
-    Examples
-    --------
-    >>> upright(np.eye(4), np.array([1.0, 0.0, 0.0]))[1]
-    1
-    """
-    right, above = up @ T_world_camera[:3, 0], -up @ T_world_camera[:3, 1]
-    if max(abs(right), abs(above)) < LEAST_UPRIGHT:
-        return T_world_camera, 0
-    turns = int(np.rint(np.arctan2(right, above) / (np.pi / 2))) % 4
-    if not turns:
-        return T_world_camera, 0
-    x, y = T_world_camera[:3, 0], T_world_camera[:3, 1]
-    turned = T_world_camera.copy()
-    for _ in range(turns):
-        x, y = y, -x
-    turned[:3, 0], turned[:3, 1] = x, y
-    return turned, turns
-
-
 def _rig(camera: Camera, border: float) -> StereoRig:
     """Return a rig whose image has the given borders."""
     centre = border * camera.focal_px
