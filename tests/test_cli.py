@@ -69,6 +69,8 @@ def test_map_prints_what_it_did(mapped: Ran, log: Path) -> None:
     assert result["features_used"] > 1000
     assert all(count > 0 for count in result["features_dropped"].values())
     assert result["seen_through"] >= 0
+    assert result["camera_height"] == pytest.approx(1.0, abs=0.05)
+    assert 0.0 <= result["camera_height_swing"] < 0.1
     grid = ConfidenceGrid.load(result["out"])
     assert result["resolution"] == grid.resolution == 0.1524
     assert result["area_free_m2"] == grid.area(CellState.FREE) > 10

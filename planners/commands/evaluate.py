@@ -25,7 +25,7 @@ def evaluate_command(
     ] = None,
     camera_height: Annotated[
         float | None,
-        typer.Option(help="Height of the camera above level ground [m]; default: fitted."),
+        typer.Option(help="Height of the camera above the ground [m]; default: fitted."),
     ] = None,
     config: ConfigOption = None,
     as_json: JsonOption = False,

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
+import numpy as np
 import typer
 
 from groundmap import CellState, GroundMapper, View, fit_ground, pose_jumps, read_views
@@ -56,7 +57,7 @@ def map_command(
     ] = None,
     camera_height: Annotated[
         float | None,
-        typer.Option(help="Height of the camera above level ground [m]; default: fitted."),
+        typer.Option(help="Height of the camera above the ground [m]; default: fitted."),
     ] = None,
     config: ConfigOption = None,
     as_json: JsonOption = False,
@@ -83,29 +84,41 @@ def map_command(
         raise InputError(str(source), "at least one view", "none")
     views = fit_ground(stopwatch.each("read", log), camera_height=camera_height, **tables["ground"])
     timed = stopwatch.each("ground", views)
-    sample, jumps = _integrate(mapper, show_progress(timed, total=total, what="mapping views"))
-    warnings = _warnings(mapper, sample) + _jump_warnings(jumps)
+    mapped = _integrate(mapper, show_progress(timed, total=total, what="mapping views"))
+    warnings = _warnings(mapper, mapped.sample) + _jump_warnings(mapped.jumps)
     for warning in warnings:
         print_message(f"warning: {warning}")
     with stopwatch.measure("save"):
         mapper.grid.save(out)
-    summary = _summary(mapper, jumps, stopwatch, out) | {"warnings": warnings}
+    summary = _summary(mapper, mapped, stopwatch, out) | {"warnings": warnings}
     emit(summary, as_json=as_json, title=f"map of {source}")
 
 
-def _integrate(mapper: GroundMapper, views: Iterable[View]) -> tuple[list[View], list[Jump]]:
-    """Map all views; return the first ones, as a sample of the log, and the jumps of the poses."""
+class _Mapped(NamedTuple):
+    """What is known of a log after all its views were mapped."""
+
+    sample: list[View]  # its first views
+    jumps: list[Jump]  # of the poses
+    camera_heights: list[float]  # [m] above the ground, of each view
+
+
+def _integrate(mapper: GroundMapper, views: Iterable[View]) -> _Mapped:
+    """Map all views."""
     sample: list[View] = []
     positions: list[Floats] = []
     times: list[float] = []
+    heights: list[float] = []
     for view in views:
         mapper.integrate(view)
         positions.append(view.T_map_base[:3, 3])
+        assert view.plane is not None
+        heights.append(float(view.plane.height(view.rig.T_base_camera[:3, 3])))
         if view.timestamp is not None:
             times.append(view.timestamp)
         if len(sample) < SAMPLE:
             sample.append(view)
-    return sample, pose_jumps(positions, times if len(times) == len(positions) else None)
+    jumps = pose_jumps(positions, times if len(times) == len(positions) else None)
+    return _Mapped(sample, jumps, heights)
 
 
 def _warnings(mapper: GroundMapper, sample: list[View]) -> list[str]:
@@ -138,7 +151,7 @@ def _jump_warnings(jumps: list[Jump]) -> list[str]:
 
 
 def _summary(
-    mapper: GroundMapper, jumps: list[Jump], stopwatch: Stopwatch, out: Path
+    mapper: GroundMapper, mapped: _Mapped, stopwatch: Stopwatch, out: Path
 ) -> dict[str, Any]:
     grid, stats = mapper.grid, mapper.stats
     area = {state: grid.area(state) for state in (CellState.FREE, CellState.NONFREE)}
@@ -151,7 +164,9 @@ def _summary(
         "features_dropped": dict(stats.features_dropped),
         "seen_through": stats.seen_through,
         "through_viewpoint": stats.through_viewpoint,
-        "pose_jumps": [jump._asdict() for jump in jumps],
+        "pose_jumps": [jump._asdict() for jump in mapped.jumps],
+        "camera_height": float(np.median(mapped.camera_heights)),
+        "camera_height_swing": float(np.ptp(mapped.camera_heights)),
         "area_free_m2": area[CellState.FREE],
         "area_nonfree_m2": area[CellState.NONFREE],
         "resolution": grid.resolution,

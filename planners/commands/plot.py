@@ -38,7 +38,7 @@ def plot_command(
     camera_height: Annotated[
         float | None,
         typer.Option(
-            help="With --explain: height of the camera above level ground [m]; default: fitted."
+            help="With --explain: height of the camera above the ground [m]; default: fitted."
         ),
     ] = None,
     config: ConfigOption = None,
