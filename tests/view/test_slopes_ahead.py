@@ -65,6 +65,17 @@ def test_a_bush_or_a_wall_on_the_way_is_no_slope(at: float, seed: int) -> None:
     assert slopes_ahead(np.concatenate([points, bush]), REACH) == []
 
 
+@given(st.floats(2, 6), st.floats(-2.5, -1.2), st.integers(0, 2**32 - 1))
+@settings(max_examples=30)
+def test_a_landing_below_an_edge_that_hides_the_way_down_is_no_slope(
+    edge: float, depth: float, seed: int
+) -> None:
+    points = road(np.random.default_rng(seed), 1500)
+    points = points[(points[:, 0] < edge) | (points[:, 0] > edge + 8.0)]
+    points[:, 2] += depth * (points[:, 0] > edge)
+    assert slopes_ahead(points, REACH) == []
+
+
 def test_features_beside_the_way_say_nothing_about_it() -> None:
     points = road(np.random.default_rng(3), 2000)
     beside = np.abs(points[:, 1]) > 2.0
