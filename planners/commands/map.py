@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
-import numpy as np
 import typer
 
-from groundmap import CellState, GroundMapper, View, fit_ground, pose_jumps, read_views
+from groundmap import CellState, GroundMapper, View, fit_ground, pose_jumps
 from groundmap.arrays import Floats
-from groundmap.errors import InputError
 from groundmap.files.archive import check_writable
 from groundmap.mapper import warm_up
 from groundmap.stopwatch import Stopwatch
@@ -25,21 +23,36 @@ from planners.commands.console import (
     show_progress,
 )
 from planners.commands.settings_file import ConfigOption, read_settings
+from planners.commands.sources import (
+    CameraHeightOption,
+    FormatOption,
+    GuessOption,
+    LevelOption,
+    PointNoiseOption,
+    PosesOption,
+    ScaleOption,
+    ScalePointsOption,
+    open_source,
+)
 
 SHOWN_JUMPS = 5  # jumps of the poses, one warning each
 NOT_MAPPING = {"startup", "read", "compile", "save", "other"}
 
 
 def map_command(
-    source: Annotated[Path, typer.Argument(help="Folder with a log of views.")],
+    source: Annotated[
+        Path,
+        typer.Argument(help="Folder with a log of views, or the map of a SLAM or SfM system."),
+    ],
     out: Annotated[Path, typer.Option(help="File of the map: .npz.")],
-    poses: Annotated[
-        Path | None,
-        typer.Option(help="File with poses to use instead: TUM rows, or id + 16 numbers."),
-    ] = None,
-    format: Annotated[
-        str | None, typer.Option(help="Format of the log; default: detected from its files.")
-    ] = None,
+    poses: PosesOption = None,
+    format: FormatOption = None,
+    scale: ScaleOption = None,
+    scale_points: ScalePointsOption = None,
+    camera_height: CameraHeightOption = None,
+    level: LevelOption = None,
+    point_noise: PointNoiseOption = None,
+    guess_visibility: GuessOption = False,
     resolution: Annotated[
         float | None, typer.Option(help="Side of a cell [m]; default: 0.1524 m.")
     ] = None,
@@ -54,10 +67,6 @@ def map_command(
     ] = None,
     max_range: Annotated[
         float | None, typer.Option(help="Drop farther features [m]; default: 20 m.")
-    ] = None,
-    camera_height: Annotated[
-        float | None,
-        typer.Option(help="Height of the camera above the ground [m]; default: fitted."),
     ] = None,
     config: ConfigOption = None,
     as_json: JsonOption = False,
@@ -78,47 +87,49 @@ def map_command(
     with stopwatch.measure("compile"):
         warm_up(mapper.settings)
     with stopwatch.measure("read"):
-        log = read_views(source, format=format, poses=poses)
-        total = len(log)
-    if total == 0:
-        raise InputError(str(source), "at least one view", "none")
-    views = fit_ground(stopwatch.each("read", log), camera_height=camera_height, **tables["ground"])
-    timed = stopwatch.each("ground", views)
-    mapped = _integrate(mapper, show_progress(timed, total=total, what="mapping views"))
-    warnings = _warnings(mapper, mapped.sample) + _jump_warnings(mapped.jumps)
+        opened = open_source(
+            source,
+            format=format,
+            poses=poses,
+            scale=scale,
+            scale_points=scale_points,
+            camera_height=camera_height,
+            level=level,
+            point_noise=point_noise,
+            guess_visibility=guess_visibility,
+        )
+    views = fit_ground(
+        stopwatch.each("read", opened.views),
+        camera_height=opened.camera_height,
+        **tables["ground"],
+    )
+    timed = opened.watch(stopwatch.each("ground", views))
+    shown = show_progress(timed, total=len(opened.views), what="mapping views")
+    sample, jumps = _integrate(mapper, shown)
+    for sentence in opened.sentences():
+        print_message(sentence)
+    warnings = opened.warnings() + _warnings(mapper, sample) + _jump_warnings(jumps)
     for warning in warnings:
         print_message(f"warning: {warning}")
     with stopwatch.measure("save"):
         mapper.grid.save(out)
-    summary = _summary(mapper, mapped, stopwatch, out) | {"warnings": warnings}
+    summary = _summary(mapper, jumps, stopwatch, out) | opened.summary() | {"warnings": warnings}
     emit(summary, as_json=as_json, title=f"map of {source}")
 
 
-class _Mapped(NamedTuple):
-    """What is known of a log after all its views were mapped."""
-
-    sample: list[View]  # its first views
-    jumps: list[Jump]  # of the poses
-    camera_heights: list[float]  # [m] above the ground, of each view
-
-
-def _integrate(mapper: GroundMapper, views: Iterable[View]) -> _Mapped:
-    """Map all views."""
+def _integrate(mapper: GroundMapper, views: Iterable[View]) -> tuple[list[View], list[Jump]]:
+    """Map all views; return the first ones, as a sample of the log, and the jumps of the poses."""
     sample: list[View] = []
     positions: list[Floats] = []
     times: list[float] = []
-    heights: list[float] = []
     for view in views:
         mapper.integrate(view)
         positions.append(view.T_map_base[:3, 3])
-        assert view.plane is not None
-        heights.append(float(view.plane.height(view.rig.T_base_camera[:3, 3])))
         if view.timestamp is not None:
             times.append(view.timestamp)
         if len(sample) < SAMPLE:
             sample.append(view)
-    jumps = pose_jumps(positions, times if len(times) == len(positions) else None)
-    return _Mapped(sample, jumps, heights)
+    return sample, pose_jumps(positions, times if len(times) == len(positions) else None)
 
 
 def _warnings(mapper: GroundMapper, sample: list[View]) -> list[str]:
@@ -132,7 +143,7 @@ def _warnings(mapper: GroundMapper, sample: list[View]) -> list[str]:
         reasons = f" (dropped: {dropped})" if dropped else ""
         warnings.insert(
             0,
-            f"the map has no free cell but where the robot stood: "
+            "the map has no free cell but where the robot stood: "
             f"{stats.features_used:,} of {total:,} features of {stats.views} views were used"
             f"{reasons}.",
         )
@@ -153,7 +164,7 @@ def _jump_warnings(jumps: list[Jump]) -> list[str]:
 
 
 def _summary(
-    mapper: GroundMapper, mapped: _Mapped, stopwatch: Stopwatch, out: Path
+    mapper: GroundMapper, jumps: list[Jump], stopwatch: Stopwatch, out: Path
 ) -> dict[str, Any]:
     grid, stats = mapper.grid, mapper.stats
     area = {state: grid.area(state) for state in (CellState.FREE, CellState.NONFREE)}
@@ -166,9 +177,7 @@ def _summary(
         "features_dropped": dict(stats.features_dropped),
         "seen_through": stats.seen_through,
         "through_viewpoint": stats.through_viewpoint,
-        "pose_jumps": [jump._asdict() for jump in mapped.jumps],
-        "camera_height": float(np.median(mapped.camera_heights)),
-        "camera_height_swing": float(np.ptp(mapped.camera_heights)),
+        "pose_jumps": [jump._asdict() for jump in jumps],
         "area_free_m2": area[CellState.FREE],
         "area_nonfree_m2": area[CellState.NONFREE],
         "resolution": grid.resolution,

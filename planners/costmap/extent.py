@@ -10,11 +10,12 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from groundmap.arrays import Bools, Floats, Ints, Ints32
-from groundmap.grid.window import GridWindow
+from groundmap.grid.window import CellBox
 from planners.errors import ProblemError
 from planners.problem.problem import PlanningProblem
 
-MOST_CELLS = 2**25  # of a costmap, which takes about 50 bytes per cell
+#: Cells by dimension: a costmap takes about 50 bytes per cell, `Voxels` and a search of them 12.
+MOST_CELLS = {2: 2**25, 3: 2**27}
 
 
 class _Tiles(NamedTuple):
@@ -25,7 +26,7 @@ class _Tiles(NamedTuple):
     part: Ints32  #: shape (n,): label of the connected part; tiles connect over sides and corners
 
 
-def padded_window(problem: PlanningProblem) -> GridWindow:
+def padded_box(problem: PlanningProblem) -> CellBox:
     """Return the cells that a problem is planned on, in any dimension.
 
     Raises
@@ -33,11 +34,11 @@ def padded_window(problem: PlanningProblem) -> GridWindow:
     ProblemError
         More than `MOST_CELLS` cells.
     """
-    return problem.grid.window(padded_bounds(problem))
+    return problem.grid.box(padded_bounds(problem))
 
 
 def padded_bounds(problem: PlanningProblem) -> Floats:
-    """Return the box of `padded_window`: lower then upper corner [m, map].
+    """Return the box of `padded_box`: lower then upper corner [m, map].
 
     It holds the observed tiles, the cleared start, and a ring of cells around them. If the tiles
     span too many cells and unknown cells are not traversable, it holds only the tiles that may be
@@ -54,11 +55,11 @@ def padded_bounds(problem: PlanningProblem) -> Floats:
         start = np.array(problem.clear_place)
         lower = np.minimum(lower, start - problem.clear_radius)
         upper = np.maximum(upper, start + problem.clear_radius)
-    cells = _cells(problem, lower, upper)
-    if cells > MOST_CELLS:
+    cells, most = _cells(problem, lower, upper), MOST_CELLS[problem.grid.ndim]
+    if cells > most:
         raise ProblemError(
             "footprint" if problem.cleared_at is None else "cleared_at",
-            f"at most {MOST_CELLS} cells in the box around the map and the cleared start",
+            f"at most {most} cells in the box around the map and the cleared start",
             f"{cells:.3g}, with {problem.clear_radius:g} m cleared around {problem.clear_place}",
             hint="Use a smaller footprint or clear_start_radius, or a map with larger cells.",
         )
@@ -75,17 +76,18 @@ def _cells(problem: PlanningProblem, lower: Floats, upper: Floats) -> float:
 def _tiles_box(problem: PlanningProblem) -> tuple[Floats, Floats]:
     """Return the corners of the box around the observed tiles, or around the reachable ones."""
     lower, upper = problem.grid.bounds().reshape(2, -1)
-    if _cells(problem, lower, upper) <= MOST_CELLS:
+    most = MOST_CELLS[problem.grid.ndim]
+    if _cells(problem, lower, upper) <= most:
         return lower, upper
     tiles = _tiles(problem)
     near = _reached(problem, tiles)
     if problem.avoids_unknown and near.any():
         lower, upper = tiles.lower[near].min(axis=0), tiles.upper[near].max(axis=0)
-        if _cells(problem, lower, upper) <= MOST_CELLS:
+        if _cells(problem, lower, upper) <= most:
             return lower, upper
     raise ProblemError(
         "grid",
-        f"at most {MOST_CELLS} cells in the box around the observed tiles",
+        f"at most {most} cells in the box around the observed tiles",
         f"{_cells(problem, lower, upper):.3g}{_far_tiles(tiles)}",
         hint="Use a map with larger cells.",
     )
