@@ -20,7 +20,7 @@ BREAKS = 2  # pieces between the places that are tried for a change of slope
 SLOPES: Floats = np.tan(np.radians(np.arange(-14.0, 15.0)))
 LEAST_RUN = 4  # pieces between two changes of slope
 STEPS: Floats = np.arange(-60.0, 61.0) * LEVEL  # [m], heights of steps, which are not slopes
-LEAST_SEEN = 3  # of these pieces are ground: what an edge hides is no slope
+BEGIN, LEAST_SEEN = 8, 5  # pieces at its beginning, and how many of them are seen to be ground
 NEAREST = 0.01  # [m], between two places of a strip
 GAIN = 4.0  # pieces of ground that a change of slope must explain beyond a step or level ground
 MOST_CHANGES = 3
@@ -60,7 +60,7 @@ def slopes_ahead(points: Floats, reach: float) -> list[Change]:
     for _ in range(MOST_CHANGES):
         piece, slope, more = _best_change(counts, ground, total, begin)
         changed = ground + slope * np.maximum(counts.at - piece * PIECE, 0.0)
-        begun = counts.ground(changed, total + slope)[piece : piece + LEAST_RUN]
+        begun = counts.ground(changed, total + slope)[piece : piece + BEGIN]
         if more < explained + GAIN or begun.sum() < LEAST_SEEN:
             break
         changes.append(Change(piece * PIECE, slope))
