@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 Place: TypeAlias = Literal["start", "goal"]
 Turning: TypeAlias = Literal["none", "any", "planned"]
@@ -82,6 +82,27 @@ def footprint_clause(radius: float, yaw: float | None) -> str:
     yaw : float or None [rad]
     """
     return f"the footprint ({f'radius {radius:.2f} m' if yaw is None else f'at yaw {yaw:.2f} rad'})"
+
+
+class WayOut(NamedTuple):
+    """A way out of unknown space around a start."""
+
+    place: Point  #: nearest position from which the goal can be reached [m, map]
+    distance: float  #: from the start [m]
+    clear_start_radius: float  #: from which on there is a route from the start [m]
+
+
+def way_out_clause(way_out: WayOut | None) -> str:
+    """Return sentences on unknown space around the start and what to do; "" if that is no cause."""
+    if way_out is None:
+        return ""
+    radius = f"{way_out.clear_start_radius:.1f}"
+    return (
+        " The cause is unknown space around the start: a camera does not see the ground that it "
+        f"starts on. Start from {format_point(way_out.place)}, {way_out.distance:.2f} m away, or, "
+        f"if the ground around the start is free, give clear_start_radius={radius} "
+        f"(--clear-start-radius {radius})."
+    )
 
 
 def left_clause(left: float | None) -> str:

@@ -26,11 +26,13 @@ from planners.error_messages import (
     Place,
     Point,
     Turning,
+    WayOut,
     footprint_clause,
     format_place,
     format_point,
     left_clause,
     nearest_clause,
+    way_out_clause,
     widest_clause,
 )
 
@@ -153,6 +155,8 @@ class UnknownSpaceError(NoRouteError):
         Nearest position where the footprint fits.
     yaw : float, optional [rad]
         Heading of a polygon footprint, if the planner plans headings.
+    way_out : WayOut, optional
+        Where a route could start, if unknown space around the start is all that prevents one.
 
     Examples
     --------
@@ -170,14 +174,15 @@ begins 0.25 m away. Map that area, or plan with unknown='allow' (--unknown allow
         needed: float,
         nearest: Point | None = None,
         yaw: float | None = None,
+        way_out: WayOut | None = None,
     ) -> None:
         self.place, self.xy, self.clearance, self.needed = place, xy, clearance, needed
-        self.nearest, self.yaw = nearest, yaw
+        self.nearest, self.yaw, self.way_out = nearest, yaw, way_out
         super().__init__(
             f"{format_place(place, xy)}: {footprint_clause(needed, yaw)} overlaps unknown or "
             f"contested space, which begins {clearance:.2f} m away. "
             "Map that area, or plan with unknown='allow' (--unknown allow)."
-            f"{nearest_clause(xy, nearest)}"
+            f"{way_out_clause(way_out) or nearest_clause(xy, nearest)}"
         )
 
 
@@ -207,6 +212,8 @@ class EnclosedError(NoRouteError):
     turning : {"none", "any", "planned"}
         What `needed` is the width of: a disc; the disc that holds an outline at any heading; the
         disc within an outline, for planners that plan headings.
+    way_out : WayOut, optional
+        Where a route could start, if unknown space around the start is all that prevents one.
 
     Examples
     --------
@@ -229,10 +236,11 @@ needs 0.60 m.
         bottleneck: Point | None = None,
         slack: float = 0.0,
         turning: Turning = "none",
+        way_out: WayOut | None = None,
     ) -> None:
         self.place, self.area, self.nearest, self.distance = place, area, nearest, distance
         self.widest_gap, self.needed, self.bottleneck = widest_gap, needed, bottleneck
-        self.turning, self.slack = turning, slack
+        self.turning, self.slack, self.way_out = turning, slack, way_out
         if turning == "planned" and (widest_gap + slack >= needed or needed == 0):
             super().__init__(
                 "no route: a search over one pose per cell and heading found no drivable motion. "
@@ -244,6 +252,7 @@ needs 0.60 m.
         super().__init__(
             f"no route: the {place} is enclosed in {extent}; the reachable cell nearest to the "
             f"goal is {format_point(nearest)}, {distance:.2f} m away.{passage}"
+            f"{way_out_clause(way_out)}"
         )
 
 

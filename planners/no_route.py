@@ -9,7 +9,12 @@ import numpy as np
 
 from groundmap.arrays import Bools
 from planners.costmap.costmap import Costmap
-from planners.costmap.endpoint_check import check_start_is_known, costmap_of, region_around
+from planners.costmap.endpoint_check import (
+    check_start_is_known,
+    costmap_of,
+    find_way_out,
+    region_around,
+)
 from planners.costmap.map_space import MapSpace
 from planners.costmap.regions import nearest_cells
 from planners.error_messages import Place, Point, Turning
@@ -54,6 +59,7 @@ def explain_no_route(space: MapSpace, *, headings: bool = False) -> EnclosedErro
         needed=2.0 * radius,
         slack=LATTICE_SLACK * space.window.resolution,
         turning="planned" if headings else turning,
+        way_out=find_way_out(space),
     )
 
 

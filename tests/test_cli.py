@@ -101,11 +101,11 @@ def test_map_names_the_likely_cause_where_there_is_no_ground(swapped: Path) -> N
 def test_map_warns_of_a_map_without_a_free_cell_and_names_the_likely_cause(swapped: Path) -> None:
     ran = run("map", swapped, "--out", swapped / "map.npz", "--camera-height", "1.5", "--json")
     assert ran.code == 0
-    assert ran.json["area_free_m2"] == 0
+    assert ran.json["area_free_m2"] < 6.0  # that of six poses
     empty, cause = ran.json["warnings"]
     assert empty == (
-        "the map has no free cell: 0 of 300 features of 6 views were used "
-        "(dropped: 300 no_disparity)."
+        "the map has no free cell but where the robot stood: 0 of 300 features of 6 views were "
+        "used (dropped: 300 no_disparity)."
     )
     assert "uL and uR may be swapped" in cause
     assert ran.err.splitlines()[-2:] == [f"warning: {empty}", f"warning: {cause}"]

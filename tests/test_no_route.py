@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -12,7 +13,7 @@ from hypothesis import given, settings
 
 from groundmap.grid.grid import ConfidenceGrid
 from oracles_planning import BLOCKED, FREE, free_field, grid_of
-from planners import EnclosedError, NonFreeError, PlanningProblem, Route, plan
+from planners import EnclosedError, NonFreeError, PlanningProblem, Route, UnknownSpaceError, plan
 from planners.costmap.costmap import Costmap
 from planners.no_route import explain_no_route, widest_route
 from planners.search.distance_field import reachable
@@ -21,6 +22,7 @@ from strategies import rngs
 
 T = TypeVar("T")
 
+UNKNOWN = 0.0  # no evidence
 CAR = [(-0.5, -0.4), (1.5, -0.4), (1.5, 0.4), (-0.5, 0.4)]  # 0.8 m wide, 3.10 m at any heading
 FACTS: dict[str, Any] = {"area": 3.0, "nearest": (1.0, 2.0), "distance": 1.5}
 
@@ -184,3 +186,48 @@ def test_in_space_volumes_are_enclosed_and_gaps_not_measured() -> None:
 def test_a_footprint_that_fits_nowhere_is_no_enclosure() -> None:
     with pytest.raises(NonFreeError, match=r"start \(6.25, 6.25\): the footprint"):
         plan(across(halves(gap=3), 9.5))
+
+
+def test_unknown_space_around_the_start_is_named_with_two_ways_out() -> None:
+    z = free_field(30, 80)
+    z[:, 18:22] = UNKNOWN  # what a camera at the start sees begins behind it
+    problem = PlanningProblem(grid_of(z), start=(15.5, 15.5), goal=(70.5, 15.5), footprint=2.0)
+    error = failure(problem)
+    assert error.way_out is not None
+    assert error.way_out.place == (24.5, 15.5)
+    assert error.way_out.distance == 9.0
+    assert str(error).endswith(
+        "The cause is unknown space around the start: a camera does not see the ground that it "
+        "starts on. Start from (24.50, 15.50), 9.00 m away, or, if the ground around the start is "
+        "free, give clear_start_radius=12.0 (--clear-start-radius 12.0)."
+    )
+    for mended in (
+        replace(problem, start=error.way_out.place),
+        replace(problem, clear_start_radius=error.way_out.clear_start_radius),
+    ):
+        assert plan(mended).length > 0
+
+
+def test_an_unknown_start_is_named_with_its_ways_out_too() -> None:
+    z = free_field(30, 80)
+    z[:, :24] = UNKNOWN
+    problem = PlanningProblem(grid_of(z), start=(20.5, 15.5), goal=(70.5, 15.5), footprint=1.0)
+    with pytest.raises(
+        UnknownSpaceError, match=r"Start from \(25\.50, 15\.50\), 5\.00 m"
+    ) as caught:
+        plan(problem)
+    assert caught.value.way_out is not None
+    assert plan(replace(problem, start=caught.value.way_out.place)).length > 0
+
+
+@pytest.mark.parametrize("options", [{"clear_start": False}, {"start": (70.5, 15.5)}])
+def test_the_start_is_no_cause_where_a_wall_is_or_nothing_is_cleared(
+    options: dict[str, Any],
+) -> None:
+    z = free_field(30, 80)
+    z[:, 18:22] = UNKNOWN if "clear_start" in options else BLOCKED
+    ends: dict[str, Any] = {"start": (15.5, 15.5), "goal": (70.5, 15.5)} | options
+    if "start" in options:
+        ends["goal"] = (15.5, 15.5)
+    error = failure(PlanningProblem(grid_of(z), footprint=2.0, **ends))
+    assert error.way_out is None

@@ -62,8 +62,8 @@ def evaluate(
         Fields of `groundmap.GroundSettings` for the maps; the heights of held-out features are
         determined with the defaults.
     camera_height : float, optional [m]
-        Use level ground this far below the left camera, for maps and held-out features, instead of
-        fitting planes.
+        Use ground this far below the left camera, for maps and held-out features, instead of
+        fitting it.
     **settings
         Fields of `groundmap.MapperSettings`.
 

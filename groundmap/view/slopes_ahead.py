@@ -19,7 +19,8 @@ STEEP = 0.1  # slope from which on a piece is several levels high
 BREAKS = 2  # pieces between the places that are tried for a change of slope
 SLOPES: Floats = np.tan(np.radians(np.arange(-14.0, 15.0)))
 LEAST_RUN = 4  # pieces between two changes of slope
-STEPS: Floats = np.arange(-20.0, 21.0) * LEVEL  # [m], heights of steps, which are not slopes
+STEPS: Floats = np.arange(-60.0, 61.0) * LEVEL  # [m], heights of steps, which are not slopes
+BEGIN, LEAST_SEEN = 8, 5  # pieces at its beginning, and how many of them are seen to be ground
 NEAREST = 0.01  # [m], between two places of a strip
 GAIN = 4.0  # pieces of ground that a change of slope must explain beyond a step or level ground
 MOST_CHANGES = 3
@@ -37,7 +38,7 @@ def slopes_ahead(points: Floats, reach: float) -> list[Change]:
 
     The way is cut into pieces. A piece is ground if most features on it are at the height in
     question. Each change of slope makes more pieces ground, and all of them together more than a
-    step at any place: a kerb is no slope.
+    step at any place: a kerb is no slope, and neither is a stair that leads out of sight.
 
     Parameters
     ----------
@@ -58,10 +59,12 @@ def slopes_ahead(points: Floats, reach: float) -> list[Change]:
     begin = 0
     for _ in range(MOST_CHANGES):
         piece, slope, more = _best_change(counts, ground, total, begin)
-        if more < explained + GAIN:
+        changed = ground + slope * np.maximum(counts.at - piece * PIECE, 0.0)
+        begun = counts.ground(changed, total + slope)[piece : piece + BEGIN]
+        if more < explained + GAIN or begun.sum() < LEAST_SEEN:
             break
         changes.append(Change(piece * PIECE, slope))
-        ground = ground + slope * np.maximum(counts.at - piece * PIECE, 0.0)
+        ground = changed
         explained, total, begin = more, total + slope, piece + LEAST_RUN
         if begin >= len(counts.at):
             break

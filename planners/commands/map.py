@@ -133,15 +133,17 @@ def _integrate(mapper: GroundMapper, views: Iterable[View]) -> tuple[list[View],
 def _warnings(mapper: GroundMapper, sample: list[View]) -> list[str]:
     """Return warnings of likely mistakes in a log, and of a map without freespace."""
     warnings = likely_mistakes(sample)
-    if mapper.grid.area(CellState.FREE) == 0:
+    # Where the robot stood, the ground is free in every map.
+    if mapper.stats.features_used == 0 or mapper.grid.area(CellState.FREE) == 0:
         stats = mapper.stats
         total = stats.features_used + stats.features_dropped.total()
         dropped = describe_dropped(stats.features_dropped)
         reasons = f" (dropped: {dropped})" if dropped else ""
         warnings.insert(
             0,
-            f"the map has no free cell: {stats.features_used:,} of {total:,} features of "
-            f"{stats.views} views were used{reasons}.",
+            "the map has no free cell but where the robot stood: "
+            f"{stats.features_used:,} of {total:,} features of {stats.views} views were used"
+            f"{reasons}.",
         )
     return warnings
 

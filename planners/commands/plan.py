@@ -87,6 +87,10 @@ def plan_command(
             " known_clearance is the distance of the route to these cells and to obstacles."
         ),
     ] = True,
+    clear_start_radius: Annotated[
+        float | None,
+        typer.Option(help="Distance from the start of unknown cells that are free [m]."),
+    ] = None,
     clearance_weight: Annotated[
         float, typer.Option(help="Extra cost per metre of a route that touches obstacles [m/m].")
     ] = PLAIN.clearance_weight,
@@ -133,6 +137,7 @@ def plan_command(
         footprint=outline(footprint),
         unknown=cast(Unknown, unknown),  # other values raise in PlanningProblem
         clear_start=clear_start,
+        clear_start_radius=clear_start_radius,
         costs=CostSettings(
             clearance_weight=clearance_weight,
             inflation_radius=inflation_radius,

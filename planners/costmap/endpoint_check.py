@@ -16,13 +16,14 @@ from planners.costmap.endpoints import links
 from planners.costmap.map_space import MapSpace
 from planners.costmap.regions import connected_to, largest_region, nearest_cells
 from planners.costmap.voxel_map import Voxels
-from planners.error_messages import Place, Point, format_point
+from planners.error_messages import Place, Point, WayOut, format_point
 from planners.errors import NonFreeError, OutsideMapError, ProblemError, UnknownSpaceError
 from planners.geometry.kernels.swept_footprint import pose_clear
 from planners.geometry.rounding import rounding_at, slack_at
 from planners.problem.problem import PlanningProblem, Pose
 
 SPACES: dict[int, type[Costmap | Voxels]] = {2: Costmap, 3: Voxels}  # by dimension of the map
+FARTHEST_OUT = 10.0  # [m], from the start to a place that the same drive saw
 MOST_LOOKUPS = 64  # tiles near a place above which all observed tiles are searched instead
 
 
@@ -139,7 +140,32 @@ def check_start_is_known(space: MapSpace) -> None:
             clearance=space.clearance_of(xy, to=unknown | space.cleared),
             needed=space.radius,
             nearest=nearest_place(space, xy, place="start"),
+            way_out=find_way_out(space),
         )
+
+
+def find_way_out(space: MapSpace) -> WayOut | None:
+    """Return where a route could start, if only unknown space near the start prevents one.
+
+    That is so if there is a route once the unknown cells up to that place count as free.
+    """
+    problem = space.problem
+    if not problem.clears_its_start or problem.unknown != "avoid":
+        return None
+    xy = problem.start_xy
+    place = nearest_place(space, xy, place="start")
+    if place is None or math.dist(xy, place) > FARTHEST_OUT:
+        return None
+    needed = math.dist(xy, place) + space.radius + space.window.resolution
+    radius = max(problem.clear_radius, math.ceil(10.0 * needed) / 10.0)
+    cleared = space_of(replace(problem, clear_start_radius=radius))
+    ends = [
+        region_around(cleared, cleared.traversable, end, radius=space.radius)
+        for end in (xy, problem.goal_xy)
+    ]
+    if not (ends[0] & ends[1]).any():
+        return None
+    return WayOut(place, math.dist(xy, place), radius)
 
 
 def nearest_place(

@@ -14,7 +14,7 @@ from groundmap.arrays import Bools, Floats
 from groundmap.evidence.ground_plane.free_support import support_chords
 from groundmap.evidence.ground_plane.height_classes import GroundView
 from groundmap.evidence.ground_plane.kernels.lines import count_contradicting
-from groundmap.evidence.ground_plane.missing_ground import missing_ground
+from groundmap.evidence.ground_plane.missing_ground import missing_ground, on_slopes
 from groundmap.evidence.ground_plane.see_through import Contradictions, contradictions
 from groundmap.evidence.ground_plane.surfaces import SurfaceKind, Surfaces, find_surfaces
 from groundmap.evidence.ground_plane.visibility import NO_SURFACE, SightFan, visible_freespace
@@ -595,3 +595,40 @@ def test_ground_beside_a_line_below_it_tells_of_a_false_match(
 ) -> None:
     ground_view = flat_view(drop_offs=[(5.0, 0.0)], supports=[ground])
     assert len(missing_ground(ground_view, 0.1)[0]) == (25 if missing else 0)
+
+
+def slope_view(depths: Floats, grounds: Floats, *, beside: float = 0.0) -> GroundView:
+    """Return features of a slope straight ahead: (range, height) below the ground, and ground."""
+    return flat_view(
+        drop_offs=[(x, beside) for x, _ in depths],
+        drop_off_heights=depths[:, 1],
+        supports=[(x, 0.0) for x in grounds],
+    )
+
+
+@given(st.floats(0.02, 0.2), st.floats(0.3, 1.2))
+def test_a_gentle_slope_is_no_drop_off_however_deep_it_leads(drop: float, step: float) -> None:
+    away = step * np.arange(1, 20)
+    view = slope_view(np.column_stack([4.0 + away, -drop * away]), np.array([3.9, 4.0]))
+    assert on_slopes(view).all()
+
+
+@pytest.mark.parametrize(
+    ("depths", "grounds"),
+    [
+        ([(5.0, -1.0), (5.5, -1.0)], [4.0, 4.5]),  # a step, and ground below it
+        ([(8.0, -0.5), (8.0, -0.8)], [4.0, 9.0]),  # the far wall of a pit, and ground behind it
+        ([(5.0, -0.4), (5.3, -0.55), (5.6, -0.7)], [4.0, 4.9]),  # the flight of a stair
+        ([(5.0, -0.3)], []),  # nothing else is seen
+    ],
+)
+def test_steps_pits_and_stairs_are_not_on_slopes(
+    depths: list[tuple[float, float]], grounds: list[float]
+) -> None:
+    assert not on_slopes(slope_view(np.array(depths), np.array(grounds))).any()
+
+
+def test_a_slope_beside_the_line_of_sight_does_not_lead_down_to_a_feature() -> None:
+    depths, grounds = np.array([(5.0, -0.1)]), np.array([4.5])
+    assert on_slopes(slope_view(depths, grounds)).all()
+    assert not on_slopes(slope_view(depths, grounds, beside=0.5)).any()

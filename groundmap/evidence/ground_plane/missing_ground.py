@@ -11,6 +11,7 @@ from groundmap.evidence.ground_plane.kernels.lines import climb_down, features_b
 DEEPEST_SIGHT = 3.0  # [m], along the ground; features that lie deeper are mostly false matches
 BESIDE = 0.15  # [m], distance up to which a ground feature is beside a line of sight
 ACROSS = 0.2  # [m], from the line of sight to a feature before it on the same slope
+WIDENING = 0.04  # the same per range: features are the farther apart, the farther they are
 LONGEST = 1.5  # [m], between two features on a slope
 STEEPEST = 0.25  # drop per distance, 14 degrees: ground that is no step
 SLACK = 0.03  # [m], error of the heights
@@ -27,7 +28,7 @@ def on_slopes(ground_view: GroundView) -> Bools:
     order = np.argsort(radius, kind="stable")
     below, reached = order >= len(ground_view.supports), np.empty(len(order), dtype=np.bool_)
     lines = (radius[order], places[order], heights[order], below)
-    climb_down(*lines, ACROSS, LONGEST, STEEPEST, SLACK, reached)
+    climb_down(*lines, ACROSS, WIDENING, LONGEST, STEEPEST, SLACK, reached)
     sloping = np.empty(len(order), dtype=np.bool_)
     sloping[order] = reached
     return sloping[len(ground_view.supports) :]

@@ -159,6 +159,7 @@ def climb_down(
     heights: Floats,
     below: Bools,
     across: float,
+    widening: float,
     longest: float,
     steepest: float,
     slack: float,
@@ -178,6 +179,8 @@ def climb_down(
         Features below the ground; the others are ground.
     across : float [m]
         Largest distance of a feature from the line of sight to the next one.
+    widening : float
+        The same per distance of the next one from the camera, where that is more.
     longest : float [m]
         Largest distance between the two along that line.
     steepest : float
@@ -192,14 +195,15 @@ def climb_down(
         if not below[row]:
             continue
         x, y = places[row] / radius[row]
+        beside = max(across, widening * radius[row])
         for other in range(row - 1, -1, -1):
-            if radius[other] < radius[row] - longest - across:
+            if radius[other] < radius[row] - longest - beside:
                 break
             if below[other] and not reached[other]:
                 continue
             gap = radius[row] - (x * places[other, 0] + y * places[other, 1])
             side = abs(x * places[other, 1] - y * places[other, 0])
-            if side > across or gap <= 0 or gap > longest:
+            if side > beside or gap <= 0 or gap > longest:
                 continue
             if heights[other] - heights[row] <= steepest * gap + slack:
                 reached[row] = True
