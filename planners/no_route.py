@@ -9,7 +9,12 @@ import numpy as np
 
 from groundmap.arrays import Bools
 from planners.costmap.costmap import Costmap
-from planners.costmap.endpoint_check import check_start_is_known, costmap_of, region_around
+from planners.costmap.endpoint_check import (
+    check_start_is_known,
+    costmap_of,
+    region_around,
+    space_of,
+)
 from planners.costmap.map_space import MapSpace
 from planners.error_messages import Place, Point, Turning
 from planners.errors import EnclosedError
@@ -53,7 +58,24 @@ def explain_no_route(space: MapSpace, *, headings: bool = False) -> EnclosedErro
         needed=2.0 * radius,
         slack=LATTICE_SLACK * space.window.resolution,
         turning="planned" if headings else turning,
+        without=_separators(problem, radius),
     )
+
+
+def _separators(problem: PlanningProblem, radius: float) -> tuple[str, ...]:
+    """Return what separates start and goal that the map does not know, by the problem's fields."""
+    given = [("keep_out", bool(problem.keep_out_areas)), ("recent", len(problem.recent_set) > 0)]
+    names = tuple(name for name, some in given if some)
+    for without in [*((name,) for name in names), names] if names else ():
+        space = space_of(replace(problem, **dict.fromkeys(without)))
+        free = space.traversable_for(radius)
+        start, goal = (
+            region_around(space, free, place, radius=radius)
+            for place in (problem.start_xy, problem.goal_xy)
+        )
+        if (start & goal).any():
+            return without
+    return ()
 
 
 def widest_route(problem: PlanningProblem) -> WidestRoute:

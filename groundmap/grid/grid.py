@@ -15,16 +15,19 @@ from groundmap.arrays import (
     Floats32,
     Ints,
     as_cell,
+    as_cells,
     as_floats,
     check_finite,
     is_number,
 )
 from groundmap.errors import FileFormatError, InputError, MergeError
 from groundmap.files.archive import read_archive, write_archive
+from groundmap.grid.cell_set import CellSet
 from groundmap.grid.extents import cells_of_box, check_size, check_whole
 from groundmap.grid.fusion import Average, UpdateRule, rule_from
 from groundmap.grid.height_layers import SIGHT_HEIGHTS, HeightLayers, as_heights
 from groundmap.grid.old_versions import upgrade
+from groundmap.grid.recent_views import RecentViews
 from groundmap.grid.tiles import LAYERS, TILE_SHAPES, Index, Tile, Tiles
 from groundmap.grid.window import CellState, GridWindow, cells_of
 from groundmap.printable import format_value, is_plain
@@ -92,6 +95,9 @@ class ConfidenceGrid:
         self.frame, self.rule = frame, rule or Average()
         self._tiles = Tiles(len(origin))
         self._layers = HeightLayers(len(origin), heights)
+        #: The newest views, see `recent`; not saved, copied or merged.
+        self.recent_views = RecentViews()
+        self._saved_recent: Ints = np.empty((0, len(origin)), dtype=np.int64)
         #: Base poses the map was seen from, shape (n, 3): x, y [m], yaw [rad], frame map.
         self.trajectory: Floats = np.empty((0, 3))
 
@@ -145,6 +151,24 @@ class ConfidenceGrid:
         cells = cells_of(xy, self.origin, self.resolution)
         values: Counts = self._tiles.values_at(cells, "count")
         return int(values[0]) if np.ndim(xy) == 1 else values
+
+    @property
+    def recent(self) -> CellSet:
+        """What is there now: the cells that the newest views saw as non-free.
+
+        The average of many views remembers the empty road under a car that has just come. On a
+        loaded map, what was there when it was saved. A merged map has none.
+        """
+        cells = self._saved_recent
+        if self.recent_views.held:
+            cells = self.recent_views.cells(self._confidence, self.resolution, self.origin)
+        return CellSet(cells, self.resolution, self.origin)
+
+    def _confidence(self, lower: Ints, upper: Ints) -> Floats32:
+        """Return the confidence of the cells from `lower` up to `upper`."""
+        confidence = self._tiles.read(lower, upper).confidence
+        self._layers.raise_confidence(confidence, lower, upper)
+        return confidence
 
     def cell_bounds(self) -> tuple[Ints, Ints]:
         """Return the first cell of the touched tiles and the cell past the last."""
@@ -328,6 +352,7 @@ class ConfidenceGrid:
             **self._tiles.to_arrays(),
             **self._layers.to_arrays(),
             "trajectory": self.trajectory,
+            "recent": self.recent.cells,
         }
         write_archive(path, header, arrays)
 
@@ -354,6 +379,7 @@ class ConfidenceGrid:
             grid._layers = HeightLayers.from_arrays(grid.ndim, grid.heights, arrays)
             grid.trajectory = as_floats("trajectory", arrays["trajectory"], (None, 3))
             check_finite("trajectory", grid.trajectory)
+            grid._saved_recent = as_cells("recent", arrays["recent"], grid.ndim)
         except (KeyError, TypeError, ValueError) as error:
             raise FileFormatError(path, "a complete map file", f"{error}") from error
         return grid

@@ -3,25 +3,37 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import partial
 from itertools import product
+from typing import TypeAlias
 
 import numpy as np
 from scipy import ndimage
 
 from groundmap.arrays import Bools, Floats, Ints
+from groundmap.grid.window import CellState
 from planners.costmap.costmap import Costmap
 from planners.costmap.endpoints import centres_around, links
 from planners.costmap.map_space import MapSpace
 from planners.costmap.voxel_map import Voxels
 from planners.error_messages import Place, Point, format_point
-from planners.errors import NonFreeError, OutsideMapError, ProblemError, UnknownSpaceError
+from planners.errors import (
+    KeepOutError,
+    NonFreeError,
+    NoRouteError,
+    OutsideMapError,
+    ProblemError,
+    UnknownSpaceError,
+)
 from planners.geometry.kernels.swept_footprint import pose_clear
 from planners.geometry.rounding import rounding_at, slack_at
 from planners.problem.problem import PlanningProblem, Pose
 
 SPACES: dict[int, type[Costmap | Voxels]] = {2: Costmap, 3: Voxels}  # by dimension of the map
+#: Cells of one kind, and the error of an end whose footprint overlaps them.
+Cause: TypeAlias = tuple[Bools, Callable[..., NoRouteError]]
 MOST_LOOKUPS = 64  # tiles near a place above which all observed tiles are searched instead
 
 
@@ -88,7 +100,7 @@ def check_space(space: MapSpace, place: Place, pose: Pose, *, headings: bool = F
 
     Raises
     ------
-    NonFreeError, UnknownSpaceError
+    NonFreeError, KeepOutError, UnknownSpaceError
     ProblemError
         A place outside the part of a large map that is planned on.
     """
@@ -97,10 +109,8 @@ def check_space(space: MapSpace, place: Place, pose: Pose, *, headings: bool = F
     if _fits(space, space.blocked, xy, yaw):
         return
     cell = tuple(np.floor(space.to_cells(xy)[0]).astype(np.int64)[::-1])
-    unknown = space.blocked & ~space.nonfree
-    checks = [(space.nonfree, NonFreeError), (unknown, UnknownSpaceError)]
-    if unknown[cell]:
-        checks.reverse()
+    checks = _causes(space)
+    checks.sort(key=lambda check: not check[0][cell])
     for blocked, error in checks:
         if not _fits(space, blocked, xy, yaw):
             raise error(
@@ -111,6 +121,17 @@ def check_space(space: MapSpace, place: Place, pose: Pose, *, headings: bool = F
                 nearest=nearest_place(space, xy, place=place, yaw=yaw),
                 yaw=yaw,
             )
+
+
+def _causes(space: MapSpace) -> list[Cause]:
+    """Return the kinds of blocked cells, with the errors that name them, by precedence."""
+    nonfree = space.window.states(epsilon=space.problem.epsilon) == CellState.NONFREE
+    checks: list[Cause] = [(space.blocked & nonfree, NonFreeError)]
+    if space.kept_out is not None:
+        checks.insert(0, (space.kept_out, KeepOutError))
+    if space.recent is not None:
+        checks.append((space.recent & ~nonfree, partial(NonFreeError, recent=True)))
+    return [*checks, (space.blocked & ~space.nonfree, UnknownSpaceError)]
 
 
 def check_start_is_known(space: MapSpace) -> None:

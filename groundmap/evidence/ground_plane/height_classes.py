@@ -45,6 +45,13 @@ class GroundView(NamedTuple):
     used: int  #: features that are in any of the above
     dropped: Counter[str]  #: features that are not, by reason
 
+    def to_map(self, xy: Floats) -> Floats:
+        """Return places, shape (..., 2) [m, view], in the map [m, map]."""
+        x, y = xy[..., 0], xy[..., 1]
+        cos, sin = self.forward
+        turned: Floats = np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
+        return self.viewpoint + turned
+
 
 class _Heights(NamedTuple):
     """Features with all that the height classes ask for; shapes (n, ...) or (m, 2, ...)."""

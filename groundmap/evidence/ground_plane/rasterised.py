@@ -186,12 +186,7 @@ class _CellsOf:
         self.ground_view, self.grid = ground_view, grid
 
     def __call__(self, xy: Floats) -> Floats:
-        x, y = xy[..., 0], xy[..., 1]
-        cos, sin = self.ground_view.forward
-        turned = np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
-        cells: Floats = (
-            self.ground_view.viewpoint + turned - self.grid.origin
-        ) / self.grid.resolution
+        cells: Floats = (self.ground_view.to_map(xy) - self.grid.origin) / self.grid.resolution
         return cells
 
 

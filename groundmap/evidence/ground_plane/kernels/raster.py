@@ -80,7 +80,8 @@ def draw_surfaces(
     """Raise z to what each surface says: on it, and in the spread around it.
 
     Non-free evidence wins over free, and the surer over the less sure: z is a maximum, and
-    `height` the top of the surface that it comes from (of equally sure ones, the highest).
+    `height` the top of the surface that it comes from (of equally sure ones, the highest that is
+    known: near the camera, what is around a surface is as sure as the surface).
     """
     for i in range(len(ends)):
         spread, top = np.float32(around[i]), np.float32(tops[i])
@@ -171,11 +172,12 @@ def _draw_line(
 def _raise(
     z: Floats32, height: Floats32, row: int, col: int, value: np.float32, top: np.float32
 ) -> None:
-    """Raise a cell to the surer value, and to the higher top among equally sure ones."""
+    """Raise a cell to the surer value, and to the highest known top among equally sure ones."""
     if value > z[row, col]:
         z[row, col], height[row, col] = value, top
     elif value == z[row, col]:
-        height[row, col] = max(height[row, col], top)
+        known = height[row, col]
+        height[row, col] = min(known, top) if max(known, top) == NO_TOP else max(known, top)
 
 
 @njit(cache=True, nogil=True)
