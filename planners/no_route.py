@@ -67,7 +67,12 @@ def _separators(problem: PlanningProblem, radius: float) -> tuple[str, ...]:
     given = [("keep_out", bool(problem.keep_out_areas)), ("recent", len(problem.recent_set) > 0)]
     names = tuple(name for name, some in given if some)
     for without in [*((name,) for name in names), names] if names else ():
-        space = space_of(replace(problem, **dict.fromkeys(without)))
+        open_problem = replace(
+            problem,
+            keep_out=None if "keep_out" in without else problem.keep_out,
+            recent=None if "recent" in without else problem.recent,
+        )
+        space = space_of(open_problem)
         free = space.traversable_for(radius)
         start, goal = (
             region_around(space, free, place, radius=radius)

@@ -165,7 +165,7 @@ def draw_cells(cells: CellSet, *, label: str, color: str = NOW, ax: Axes) -> lis
         return []
     corners = cells.origin + cells.cells[:, ::-1] * cells.resolution
     square = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]) * cells.resolution
-    squares = PolyCollection(corners[:, None] + square, facecolor=color, zorder=1.5)
+    squares = PolyCollection(list(corners[:, None] + square), facecolor=color, zorder=1.5)
     ax.add_collection(squares, autolim=False)
     add_to_legend(ax, [Patch(facecolor=color, label=label)])
     return [squares]

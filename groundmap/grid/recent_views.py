@@ -135,7 +135,8 @@ class RecentViews:
         cells = cells[:, ::-1] - lower
         inside = np.logical_and.reduce((cells >= 0) & (cells < confidence.shape), axis=1)
         cells = cells[inside]
-        return cells[confidence[tuple(cells.T)] <= -EPSILON] + lower
+        hidden: Ints = cells[confidence[tuple(cells.T)] <= -EPSILON] + lower
+        return hidden
 
 
 def _is_new(cells: Ints, confidence: Floats32, near: float) -> Bools:

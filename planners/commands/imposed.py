@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 import shapely
 import typer
 
-from groundmap import CellSet, ConfidenceGrid, draw
+from groundmap import CellSet, ConfidenceGrid
 from planners.problem.keep_out_file import read_keep_out
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 RecentOption = Annotated[
     bool,
@@ -35,12 +32,6 @@ class Imposed(NamedTuple):
 
     recent: CellSet | None  #: what the newest views saw as non-free
     keep_out: list[shapely.Polygon]
-
-    def draw(self, axes: Axes) -> None:
-        """Draw the areas apart from the map."""
-        if self.recent is not None:
-            draw.draw_cells(self.recent, label="seen by the newest views", ax=axes)
-        draw.draw_keep_out(self.keep_out, ax=axes)
 
 
 def imposed(*, recent: bool, keep_out: list[Path] | None, grid: ConfidenceGrid) -> Imposed:

@@ -103,7 +103,9 @@ def draw_map(
     draw.draw_grid(grid, bounds=box, ax=axes)
     draw.draw_trajectory(grid.trajectory, ax=axes)
     if areas is not None:
-        areas.draw(axes)
+        if areas.recent is not None:
+            draw.draw_cells(areas.recent, label="seen by the newest views", ax=axes)
+        draw.draw_keep_out(areas.keep_out, ax=axes)
     if graph is not None:
         draw.draw_graph(graph.vertices[:, :2], graph.edges, ax=axes)
     if waypoints is not None:

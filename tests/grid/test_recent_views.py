@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -48,7 +49,7 @@ def with_car(at: float, *, timestamp: float | None = None, count: int = 40) -> V
     return view_of(np.concatenate([ground[~hidden], car(at, count=count)]), timestamp=timestamp)
 
 
-def empty_road(views: int = 10, **settings: int | float) -> GroundMapper:
+def empty_road(views: int = 10, **settings: Any) -> GroundMapper:
     mapper = GroundMapper(resolution=0.2, **settings)
     for _ in range(views):
         mapper.integrate(view_of(road(), timestamp=0.0))
@@ -133,7 +134,7 @@ def test_what_the_map_knows_hides_nothing_that_the_map_calls_free() -> None:
 def test_planning_keeps_away_from_what_is_there_now() -> None:
     mapper = empty_road()
     mapper.integrate(with_car(8.0))
-    options = {"start": (1.5, 0.0), "footprint": 0.5}
+    options: dict[str, Any] = {"start": (1.5, 0.0), "footprint": 0.5}
     blind = PlanningProblem(mapper.grid, goal=(10.0, 0.0), **options)
     through = plan(blind).length
     assert through < 9.0
