@@ -219,9 +219,10 @@ def _pose(name: str, values: Sequence[float] | Floats, ndim: int) -> tuple[float
     places |= isinstance(values, Sequence) and not isinstance(values, str)
     if not places or len(values) not in (ndim, ndim + 1) or not all(map(is_number, values)):
         raise ProblemError(name, expected, repr(values))
-    if max(map(abs, values[:ndim])) > FARTHEST:
+    pose = tuple(map(float, values))
+    if max(map(abs, pose[:ndim])) > FARTHEST:
         raise ProblemError(name, f"a place within {FARTHEST:g} m of the origin", repr(values))
-    return tuple(map(float, values))
+    return pose
 
 
 def _yaw(pose: Sequence[float] | Floats, ndim: int) -> float | None:
