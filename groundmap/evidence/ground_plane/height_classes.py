@@ -20,6 +20,7 @@ from groundmap.view.camera_check import check_camera, check_plane
 from groundmap.view.ground_plane import GroundPlane
 from groundmap.view.view import Features, View, sigma_along
 
+UNSURE = 2.0  # standard deviations that must not reach from a feature to the camera
 HOLLOW = 0.02  # [1/m of range], how deep ground may lie below the plane and still be driven on
 
 
@@ -89,9 +90,9 @@ def flatten(view: View, settings: MapperSettings, *, number: int | None = None) 
 
     Ground features lie within max(step_height, 2 sigma_h + r sigma_tilt) of the plane; obstacle
     features above that, up to the robot's height; higher ones are overhead, lower ones below
-    ground. A segment that leaves the obstacle band is clipped to it. Features whose standard
-    deviation is above `max_range` are dropped. `number` is the index of the view in its log, for
-    error messages.
+    ground. A segment that leaves the obstacle band is clipped to it. Features of unknown
+    depth are dropped: those within two standard deviations of the camera. `number` is the index of
+    the view in its log, for error messages.
 
     Raises
     ------
@@ -189,7 +190,7 @@ class _Classes(NamedTuple):
 def _point_classes(points: _Heights, settings: MapperSettings, dropped: Counter[str]) -> _Classes:
     near = points.radius < settings.min_range
     far = points.radius > settings.max_range
-    unsure = ~near & ~far & (points.sigma > settings.max_range)
+    unsure = ~near & ~far & _is_unsure(points)
     inside = ~near & ~far & ~unsure
     overhead = inside & (points.height > settings.robot_height)
     below = inside & (points.height < -points.tolerance)
@@ -210,11 +211,17 @@ def _point_classes(points: _Heights, settings: MapperSettings, dropped: Counter[
     )
 
 
+def _is_unsure(features: _Heights) -> Bools:
+    """Return which features may as well be at the camera: nothing is known of their depth."""
+    unsure: Bools = UNSURE * features.sigma > features.radius
+    return unsure
+
+
 def _segment_classes(
     segments: _Heights, settings: MapperSettings, dropped: Counter[str]
 ) -> _Classes:
     """Cut every segment into its obstacle piece and its ground piece, each possibly empty."""
-    unsure: Bools = np.logical_or.reduce(segments.sigma > settings.max_range, axis=1)
+    unsure: Bools = np.logical_or.reduce(_is_unsure(segments), axis=1)
     dropped["too_uncertain"] += int(unsure.sum())
     segments = _pick(segments, ~unsure)
     reached = inside_circle(segments.xy[:, 0], segments.xy[:, 1], settings.max_range)

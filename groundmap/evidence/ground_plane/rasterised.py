@@ -39,8 +39,8 @@ def evidence_of(
     """Draw surfaces and freespace of a view into cells.
 
     Freespace is below 0 in the fan: -1 where sight touches the ground, and the nearer to 0 the
-    higher the lowest line of sight passes. Surfaces are above 0, spread by the uncertainty model.
-    Where the base stands the ground is free, as wide as the narrowest footprint.
+    higher the lowest line of sight passes. Surfaces are above 0, spread by the uncertainty model
+    up to `max_range`. Where the base stands the ground is free, as wide as the narrowest footprint.
     Where both fall into a cell the surface wins: letting the last ray win erases walls. Where
     ground is missing, a cell is non-free, too.
 
@@ -53,7 +53,8 @@ def evidence_of(
     to_cells = _CellsOf(ground_view, grid)
     origin = to_cells(np.zeros((1, 2)))[0]
     free, ends, cores = map(to_cells, (fan.free, surfaces.ends, surfaces.cores))
-    outlines = to_cells(model.outline(surfaces.cores, surfaces.reach))
+    spread = model.outline(surfaces.cores, surfaces.reach)
+    outlines, sides = to_cells(spread), to_cells(_within(spread, settings.max_range))
     caps = model.caps(surfaces.reach) / grid.resolution
     discs = surfaces.discs / grid.resolution
     wheels, half_width = (
@@ -68,7 +69,9 @@ def evidence_of(
         *_around(cores, caps),
         *_around(ends, discs[:, None]),
     ]
+    farthest = settings.max_range / grid.resolution
     drawn = np.concatenate([origin[None], *(array.reshape(-1, 2) for array in corners)])
+    drawn = np.clip(drawn, origin - farthest - MARGIN, origin + farthest + MARGIN)
     if not (np.abs(drawn) < FARTHEST_CELL).all():
         raise InputError(
             "view",
@@ -105,14 +108,24 @@ def evidence_of(
         ends[drawn] - lower,
         cores[drawn] - lower,
         outlines[drawn] - lower,
+        sides[drawn] - lower,
         caps[drawn],
         discs[drawn],
         (on_surface * belief)[drawn],
         (around * belief)[drawn],
         surfaces.tops.max(axis=1)[drawn],
+        origin - lower,
+        farthest,
     )
     evidence = Evidence(lower[::-1].astype(np.int64), z, height)
     return with_drop_offs(evidence, ground_view, grid)
+
+
+def _within(places: Floats, farthest: float) -> Floats:
+    """Return places, shape (..., 2) [m, view], pulled along their rays to within a distance."""
+    ranges = np.hypot(places[..., 0], places[..., 1])
+    within: Floats = places * np.minimum(farthest / np.maximum(ranges, farthest), 1.0)[..., None]
+    return within
 
 
 def _draw_sight(

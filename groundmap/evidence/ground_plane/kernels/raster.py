@@ -71,30 +71,35 @@ def draw_surfaces(
     ends: Floats,
     cores: Floats,
     outlines: Floats,
+    sides: Floats,
     caps: Floats,
     discs: Floats,
     on_surface: Floats,
     around: Floats,
     tops: Floats,
+    origin: Floats,
+    farthest: float,
 ) -> None:
     """Raise z to what each surface says: on it, and in the spread around it.
 
     Non-free evidence wins over free, and the surer over the less sure: z is a maximum, and
     `height` the top of the surface that it comes from (of equally sure ones, the highest that is
-    known: near the camera, what is around a surface is as sure as the surface).
+    known: near the camera, what is around a surface is as sure as the surface). Nothing spreads
+    beyond `farthest` from `origin`; `sides` are the outlines, pulled to within that distance.
     """
     for i in range(len(ends)):
         spread, top = np.float32(around[i]), np.float32(tops[i])
-        _fill_quadrangle(z, height, outlines[i], spread, NO_TOP)
-        _draw_line(z, height, outlines[i, 0], outlines[i, 3], spread, NO_TOP)
-        _draw_line(z, height, outlines[i, 1], outlines[i, 2], spread, NO_TOP)
+        _fill_quadrangle(z, height, outlines[i], spread, NO_TOP, origin, farthest)
+        _draw_line(z, height, sides[i, 0], sides[i, 3], spread, NO_TOP)
+        _draw_line(z, height, sides[i, 1], sides[i, 2], spread, NO_TOP)
         for side in range(2):
             if caps[i, side] > 0.0:
-                _fill_disc(z, height, cores[i, side], caps[i, side], spread, NO_TOP)
+                cap, radius = cores[i, side], caps[i, side]
+                _fill_disc(z, height, cap, radius, spread, NO_TOP, origin, farthest)
         surface = np.float32(on_surface[i])
         if discs[i] > 0.0:
             middle = 0.5 * (ends[i, 0] + ends[i, 1])
-            _fill_disc(z, height, middle, discs[i], surface, top)
+            _fill_disc(z, height, middle, discs[i], surface, top, origin, np.inf)
             _draw_line(z, height, middle, middle, surface, top)
         else:
             _draw_line(z, height, ends[i, 0], ends[i, 1], surface, top)
@@ -102,11 +107,21 @@ def draw_surfaces(
 
 @njit(cache=True, nogil=True)
 def _fill_quadrangle(
-    z: Floats32, height: Floats32, corners: Floats, value: np.float32, top: np.float32
+    z: Floats32,
+    height: Floats32,
+    corners: Floats,
+    value: np.float32,
+    top: np.float32,
+    origin: Floats,
+    farthest: float,
 ) -> None:
     lowest, highest = corners[:, 1].min(), corners[:, 1].max()
     crossings = np.empty(4)
     for row in range(max(_first_centre(lowest), 0), min(_first_centre(highest), z.shape[0])):
+        half = farthest**2 - (row + 0.5 - origin[1]) ** 2
+        if half < 0.0:
+            continue
+        half = np.sqrt(half)
         count = 0
         for i in range(4):
             p, q = corners[i], corners[(i + 1) % 4]
@@ -118,15 +133,22 @@ def _fill_quadrangle(
                 count += 1
         crossings[:count].sort()
         for pair in range(0, count - 1, 2):
-            left = max(_first_centre(crossings[pair]), 0)
-            right = min(_first_centre(crossings[pair + 1]), z.shape[1])
+            left = max(_first_centre(max(crossings[pair], origin[0] - half)), 0)
+            right = min(_first_centre(min(crossings[pair + 1], origin[0] + half)), z.shape[1])
             for col in range(left, right):
                 _raise(z, height, row, col, value, top)
 
 
 @njit(cache=True, nogil=True)
 def _fill_disc(
-    z: Floats32, height: Floats32, centre: Floats, radius: float, value: np.float32, top: np.float32
+    z: Floats32,
+    height: Floats32,
+    centre: Floats,
+    radius: float,
+    value: np.float32,
+    top: np.float32,
+    origin: Floats,
+    farthest: float,
 ) -> None:
     for row in range(
         max(_first_centre(centre[1] - radius), 0),
@@ -138,7 +160,8 @@ def _fill_disc(
             min(_first_centre(centre[0] + radius) + 1, z.shape[1]),
         ):
             dx = col + 0.5 - centre[0]
-            if dx * dx + dy * dy <= radius * radius:
+            away = (col + 0.5 - origin[0]) ** 2 + (row + 0.5 - origin[1]) ** 2
+            if dx * dx + dy * dy <= radius * radius and away <= farthest * farthest:
                 _raise(z, height, row, col, value, top)
 
 
