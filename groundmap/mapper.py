@@ -27,6 +27,7 @@ from groundmap.view.ground_plane import GroundPlane
 from groundmap.view.stereo_rig import StereoRig
 from groundmap.view.view import View
 
+PLACES = 2.0**30  # [1/m], of the triangulated places: about a nanometre
 # Heights that evidence is kept apart by [step_height]. Below the lowest, sight touches the ground.
 SIGHT_STEPS = (1 / 3, 1.0, 4.0)
 
@@ -165,7 +166,10 @@ class GroundMapper:
             ground_view = flatten(view, self.settings, number=self.stats.views)
             ground_view = smooth_features(ground_view, self.settings)
         with self.stages.measure("triangulate"):
-            mesh = triangulate(ground_view.points, ground_view.segments)
+            # Where points lie on a line or a circle, rounding of the input must not choose between
+            # triangulations that are equally good.
+            places = np.round(ground_view.points * PLACES) / PLACES
+            mesh = triangulate(places, ground_view.segments)
         with self.stages.measure("surfaces"):
             surfaces = find_surfaces(ground_view, mesh, self.settings)
         with self.stages.measure("sight"):

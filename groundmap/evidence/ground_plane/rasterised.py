@@ -9,6 +9,7 @@ from groundmap.errors import InputError
 from groundmap.evidence.evidence import Evidence
 from groundmap.evidence.ground_plane.height_classes import GroundView
 from groundmap.evidence.ground_plane.kernels.raster import (
+    EDGE,
     draw_surfaces,
     fill_star,
     lowest_sight,
@@ -157,7 +158,7 @@ def with_drop_offs(evidence: Evidence, ground_view: GroundView, grid: Confidence
     passed, line = missing_ground(ground_view, 0.5 * grid.resolution)
     number = np.concatenate([np.arange(len(ground_view.drop_offs)), line])
     places = np.concatenate([ground_view.drop_offs, passed])
-    cells = np.floor(_CellsOf(ground_view, grid)(places)).astype(np.int64)[:, ::-1]
+    cells = np.floor(_CellsOf(ground_view, grid)(places) + EDGE).astype(np.int64)[:, ::-1]
     lower, z, height = _grown(evidence, cells.min(axis=0), cells.max(axis=0) + 1)
     # From the least sure to the surest, and of equally sure ones the least deep last.
     order = np.lexsort(

@@ -2,6 +2,8 @@
 
 A cell is inside a polygon if its centre is; borders are half-open, so that polygons that share a
 border share no cell and leave none out. A line touches every cell that it passes through.
+Features in whole pixels, and viewpoints on corners of cells, put borders exactly on centres: what
+lies on a border up to rounding counts by one rule.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ from groundmap.arrays import Bools, Bytes, Floats, Floats32
 
 FREE = np.float32(-1.0)
 NO_TOP = np.float32(np.inf)  # where a surface may be, but was not seen
-EDGE = 1e-9  # [cells]: a centre this near to a triangle is in it
+EDGE = 1e-9  # [cells]: places this near to a border or a centre are on it, whatever the rounding
 STEPS = np.float32(64.0)  # [1/m], heights are rounded up to: where a map lies doesn't change them
 
 
@@ -60,8 +62,8 @@ def _flip_right_of(odd: Bytes, p: Floats, q: Floats) -> None:
 
 @njit(cache=True, nogil=True)
 def _first_centre(coordinate: float) -> int:
-    """Return the first cell whose centre is at or after a coordinate."""
-    return int(np.ceil(coordinate - 0.5))
+    """Return the first cell whose centre is at or after a coordinate, up to rounding."""
+    return int(np.ceil(coordinate - 0.5 - EDGE))
 
 
 @njit(cache=True, nogil=True)
@@ -161,7 +163,8 @@ def _fill_disc(
         ):
             dx = col + 0.5 - centre[0]
             away = (col + 0.5 - origin[0]) ** 2 + (row + 0.5 - origin[1]) ** 2
-            if dx * dx + dy * dy <= radius * radius and away <= farthest * farthest:
+            near = dx * dx + dy * dy <= radius * radius + EDGE
+            if near and away <= farthest * farthest + EDGE:
                 _raise(z, height, row, col, value, top)
 
 
@@ -170,8 +173,8 @@ def _draw_line(
     z: Floats32, height: Floats32, p: Floats, q: Floats, value: np.float32, top: np.float32
 ) -> None:
     """Visit the cells from p to q in order (Amanatides and Woo 1987)."""
-    col, row = int(np.floor(p[0])), int(np.floor(p[1]))
-    last_col, last_row = int(np.floor(q[0])), int(np.floor(q[1]))
+    col, row = int(np.floor(p[0] + EDGE)), int(np.floor(p[1] + EDGE))
+    last_col, last_row = int(np.floor(q[0] + EDGE)), int(np.floor(q[1] + EDGE))
     dx, dy = q[0] - p[0], q[1] - p[1]
     step_x, step_y = (1 if dx > 0 else -1), (1 if dy > 0 else -1)
     # Share of the line at the next border in x and y, and from one border to the next.
@@ -183,7 +186,7 @@ def _draw_line(
     for _ in range(abs(last_col - col) + abs(last_row - row) + 1):
         if 0 <= row < z.shape[0] and 0 <= col < z.shape[1]:
             _raise(z, height, row, col, value, top)
-        if col != last_col and (next_x < next_y or row == last_row):
+        if col != last_col and (next_x + EDGE < next_y or row == last_row):
             col += step_x
             next_x += each_x
         else:
@@ -231,13 +234,13 @@ def lowest_sight(
         # that a quarter turn of the map only swaps them.
         slope_x = (by * fall_a - ay * fall_b) / area
         slope_y = (ax * fall_b - bx * fall_a) / area
-        first = max(_first_centre(origin[1] + min(0.0, ay, by) - EDGE), 0)
-        last = min(_first_centre(origin[1] + max(0.0, ay, by) + EDGE), height.shape[0])
+        first = max(_first_centre(origin[1] + min(0.0, ay, by)), 0)
+        last = min(_first_centre(origin[1] + max(0.0, ay, by) + 2.0 * EDGE), height.shape[0])
         for row in range(first, last):
             y = row + 0.5 - origin[1]
             left, right = _span(y, ax, ay, bx, by)
-            begin = max(_first_centre(origin[0] + left - EDGE), 0)
-            end = min(_first_centre(origin[0] + right + EDGE), height.shape[1])
+            begin = max(_first_centre(origin[0] + left), 0)
+            end = min(_first_centre(origin[0] + right + 2.0 * EDGE), height.shape[1])
             for col in range(begin, end):
                 x = col + 0.5 - origin[0]
                 low = np.float32(eye + (slope_x * x + slope_y * y))
@@ -260,7 +263,7 @@ def roll_over(z: Floats32, height: Floats32, centre: Floats, radius: float) -> N
             min(_first_centre(centre[0] + radius) + 1, z.shape[1]),
         ):
             dx, dy = col + 0.5 - centre[0], row + 0.5 - centre[1]
-            if dx * dx + dy * dy <= radius * radius:
+            if dx * dx + dy * dy <= radius * radius + EDGE:
                 z[row, col], height[row, col] = FREE, 0.0
 
 
