@@ -109,6 +109,6 @@ def widest_gap(chords: Floats, settings: MapperSettings) -> float:
     """
     if len(chords) == 0:
         return settings.sight_gap
-    width = np.hypot(*(chords[:, 1] - chords[:, 0]).T)
-    usual = float(np.quantile(width, USUAL_GAPS))
+    width = np.sort(np.hypot(*(chords[:, 1] - chords[:, 0]).T))
+    usual = float(np.interp(USUAL_GAPS * (len(width) - 1), np.arange(len(width)), width))
     return min(max(UNUSUAL * usual, settings.support_width), settings.sight_gap)

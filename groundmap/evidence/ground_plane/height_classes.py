@@ -108,17 +108,16 @@ def flatten(view: View, settings: MapperSettings, *, number: int | None = None) 
     forward = T_map_camera[:2, 2] / np.hypot(T_map_camera[0, 2], T_map_camera[1, 2])
     dropped = Counter(view.dropped)
     points = _measure(view.points, view, plane, forward, settings)
-    lasting = (view.segments.xyz[:, 0] != view.segments.xyz[:, 1]).any(axis=1)
-    dropped["zero_length"] += int((~lasting).sum())
-    segments = _measure(view.segments.select(lasting), view, plane, forward, settings)
-    segments.feature[...] += len(view.points)
-    parts = [
-        _point_classes(points, settings, dropped),
-        _segment_classes(segments, settings, dropped),
-    ]
+    parts = [_point_classes(points, settings, dropped)]
+    if len(view.segments):  # most logs have none
+        lasting = (view.segments.xyz[:, 0] != view.segments.xyz[:, 1]).any(axis=1)
+        dropped["zero_length"] += int((~lasting).sum())
+        segments = _measure(view.segments.select(lasting), view, plane, forward, settings)
+        segments.feature[...] += len(view.points)
+        parts.append(_segment_classes(segments, settings, dropped))
     obstacles, grounds = [part.obstacles for part in parts], [part.ground for part in parts]
     n_points = len(obstacles[0].xy)
-    ends = np.arange(n_points, n_points + len(obstacles[1].xy), dtype=np.int64)
+    ends = np.arange(n_points, sum(len(part.xy) for part in obstacles), dtype=np.int64)
     return GroundView(
         viewpoint=T_map_camera[:2, 3],
         base=_in_view(view.T_map_base[:2, 3] - T_map_camera[:2, 3], forward)[None],
