@@ -53,11 +53,15 @@ def evidence_of(
     model = MODELS[settings.uncertainty]
     to_cells = _CellsOf(ground_view, grid)
     origin = to_cells(np.zeros((1, 2)))[0]
-    free, ends, cores = map(to_cells, (fan.free, surfaces.ends, surfaces.cores))
-    spread = model.outline(surfaces.cores, surfaces.reach)
-    outlines, sides = to_cells(spread), to_cells(_within(spread, settings.max_range))
-    caps = model.caps(surfaces.reach) / grid.resolution
-    discs = surfaces.discs / grid.resolution
+    firm = np.flatnonzero(surfaces.kind != SurfaceKind.DOUBTFUL)
+    cores, reach = surfaces.cores[firm], surfaces.reach[firm]
+    spread = model.outline(cores, reach)
+    sides = _within(spread, settings.max_range)
+    free, ends, cores, outlines, sides = map(
+        to_cells, (fan.free, surfaces.ends[firm], cores, spread, sides)
+    )
+    caps = model.caps(reach) / grid.resolution
+    discs = surfaces.discs[firm] / grid.resolution
     wheels, half_width = (
         to_cells(ground_view.base),
         0.5 * settings.narrowest_footprint / grid.resolution,
@@ -91,9 +95,8 @@ def evidence_of(
         )
     z = np.zeros(shape[::-1], dtype=np.float32)
     height = np.full(z.shape, ground_view.camera_height, dtype=np.float32)
-    on_surface, around = model.evidence(surfaces.reach, grid.resolution)
-    belief = fan.contradictions.belief
-    drawn = surfaces.kind != SurfaceKind.DOUBTFUL
+    on_surface, around = model.evidence(reach, grid.resolution)
+    belief = fan.contradictions.belief[firm]
     if len(free):
         odd = np.zeros(z.shape, dtype=np.uint8)
         free = free - lower
@@ -106,15 +109,15 @@ def evidence_of(
     draw_surfaces(
         z,
         height,
-        ends[drawn] - lower,
-        cores[drawn] - lower,
-        outlines[drawn] - lower,
-        sides[drawn] - lower,
-        caps[drawn],
-        discs[drawn],
-        (on_surface * belief)[drawn],
-        (around * belief)[drawn],
-        surfaces.tops.max(axis=1)[drawn],
+        ends - lower,
+        cores - lower,
+        outlines - lower,
+        sides - lower,
+        caps,
+        discs,
+        on_surface * belief,
+        around * belief,
+        surfaces.tops[firm].max(axis=1),
         origin - lower,
         farthest,
     )
