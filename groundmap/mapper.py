@@ -13,7 +13,7 @@ from groundmap.evidence.evidence import Evidence
 from groundmap.evidence.ground_plane.height_classes import GroundView, flatten
 from groundmap.evidence.ground_plane.rasterised import evidence_of
 from groundmap.evidence.ground_plane.ray_smoothing import smooth_features
-from groundmap.evidence.ground_plane.surfaces import Surfaces, find_surfaces
+from groundmap.evidence.ground_plane.surfaces import SurfaceKind, Surfaces, find_surfaces
 from groundmap.evidence.ground_plane.visibility import SightFan, visible_freespace
 from groundmap.evidence.triangulation import Mesh, triangulate
 from groundmap.grid.cell_set import CellSet
@@ -181,9 +181,18 @@ class GroundMapper:
 
 def _recent_view(parts: ViewParts, timestamp: float | None) -> RecentView:
     """Return what is kept of a view as long as it is one of the newest."""
-    ground_view = parts.ground_view
-    features = ground_view.to_map(ground_view.points)
-    return RecentView(*parts.evidence, ground_view.viewpoint, features, timestamp)
+    surfaces, evidence = parts.surfaces, parts.evidence
+    believed = (surfaces.kind != SurfaceKind.DOUBTFUL) & (parts.fan.contradictions.against == 0)
+    missing = np.empty((0, 2), dtype=np.int64)
+    if len(parts.ground_view.drop_offs) and evidence.height is not None:
+        missing = np.argwhere((evidence.z > 0) & (evidence.height < 0)) + evidence.lower
+    return RecentView(
+        parts.ground_view.to_map(surfaces.ends[believed]),
+        surfaces.kind[believed] != SurfaceKind.LINK,
+        missing,
+        parts.ground_view.viewpoint,
+        timestamp,
+    )
 
 
 def _pose2d(view: View) -> Floats:

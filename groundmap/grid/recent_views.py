@@ -25,13 +25,12 @@ Read: TypeAlias = Callable[[Ints, Ints], Floats32]
 
 
 class RecentView(NamedTuple):
-    """What one view said, see `groundmap.evidence.evidence.Evidence`."""
+    """What one view saw as non-free."""
 
-    lower: Ints
-    z: Floats32
-    height: Floats32 | None
+    surfaces: Floats  #: shape (k, 2, d) [m, map], ends of surfaces that nothing is seen through
+    lone: Bools  #: shape (k,), which of them are a single point or segment feature
+    cells: Ints  #: shape (n, d), further cells, such as those where ground is missing
     viewpoint: Floats  #: shape (d,) [m, map]
-    features: Floats  #: shape (n, d) [m, map], obstacle features
     timestamp: float | None = None  #: [s]
 
 
@@ -46,8 +45,8 @@ class RecentViews:
     seconds : float, optional [s]
         Views are kept that are no older than this before the newest.
     spacing : float, default 1.0 [m]
-        A cell counts if two features are within this distance: a lone one is most likely a false
-        match.
+        A lone feature counts if another surface is within this distance: else it is most likely a
+        false match.
     depth : float, default 4.5 [m]
         Where something new is, cells that it hides count up to this far behind what is seen of it.
     """
@@ -93,22 +92,12 @@ class RecentViews:
         """
         parts = [np.empty((0, len(origin)), dtype=np.int64)]
         for view in self.held:
-            seen = self._confirmed(view, _nonfree_cells(view), resolution, origin)
+            surfaces = view.surfaces[_is_confirmed(view, self.spacing)]
+            seen = np.concatenate([_crossed(surfaces, resolution, origin), view.cells])
             if len(seen):
                 parts += [seen, self._hidden(view, seen, read, resolution, origin)]
         cells: Ints = np.unique(np.concatenate(parts), axis=0)
         return cells
-
-    def _confirmed(self, view: RecentView, cells: Ints, resolution: float, origin: Floats) -> Ints:
-        """Return the cells that two features are near, and all where ground is missing."""
-        sure = np.zeros(len(cells), dtype=np.bool_)
-        if view.height is not None:
-            sure |= view.height[tuple((cells - view.lower).T)] < 0.0
-        if len(view.features) > 1:
-            centres = origin + (cells[:, ::-1] + 0.5) * resolution
-            tree = cKDTree(view.features)
-            sure |= tree.query_ball_point(centres, self.spacing, return_length=True) > 1
-        return cells[sure]
 
     def _hidden(
         self, view: RecentView, seen: Ints, read: Read, resolution: float, origin: Floats
@@ -131,30 +120,54 @@ class RecentViews:
         beams = _corners(new.shape[1]) * 0.5
         ahead = steps[None, :, None] * (away / ranges[:, None])[:, None, :]
         places = new[:, None, None, ::-1] + 0.5 + beams[None, :, None, :] + ahead[:, None]
-        cells = np.unique(np.floor(places).astype(np.int64).reshape(-1, new.shape[1]), axis=0)
-        cells = cells[:, ::-1] - lower
+        cells = np.floor(places).astype(np.int64).reshape(-1, new.shape[1])[:, ::-1] - lower
         inside = np.logical_and.reduce((cells >= 0) & (cells < confidence.shape), axis=1)
-        cells = cells[inside]
-        hidden: Ints = cells[confidence[tuple(cells.T)] <= -EPSILON] + lower
+        behind = np.zeros(confidence.shape, dtype=np.bool_)
+        behind[tuple(cells[inside].T)] = True
+        hidden: Ints = np.argwhere(behind & (confidence <= -EPSILON)) + lower
         return hidden
 
 
 def _is_new(cells: Ints, confidence: Floats32, near: float) -> Bools:
     """Return which cells the map calls free, with no non-free cell within `near` cells."""
     new: Bools = confidence[tuple(cells.T)] <= -EPSILON
-    known = np.argwhere(confidence >= EPSILON)
-    if len(known):
-        distances, _ = cKDTree(known).query(cells, distance_upper_bound=near)
-        new &= np.isinf(distances)
+    steps = np.arange(-np.floor(near), np.floor(near) + 1).astype(np.int64)
+    around = np.stack(np.meshgrid(*[steps] * confidence.ndim), axis=-1).reshape(-1, confidence.ndim)
+    around = around[np.linalg.norm(around, axis=1) <= near]
+    places = cells[new][:, None] + around
+    known = confidence[tuple(np.moveaxis(places, -1, 0))] >= EPSILON
+    new[new] = ~np.logical_or.reduce(known, axis=1)
     return new
 
 
-def _nonfree_cells(view: RecentView) -> Ints:
-    """Return where the view saw a surface or missing ground, without the spread around them."""
-    nonfree = view.z >= EPSILON
-    if view.height is not None:
-        nonfree &= np.isfinite(view.height)
-    return np.argwhere(nonfree) + view.lower
+def _is_confirmed(view: RecentView, spacing: float) -> Bools:
+    """Return which surfaces are no lone feature without another surface within `spacing` [m]."""
+    confirmed = ~view.lone
+    lone = np.flatnonzero(view.lone)
+    if len(lone) and len(view.surfaces) > 1:
+        middles = view.surfaces.mean(axis=1)
+        near = cKDTree(middles).query_ball_point(middles[lone], spacing, return_length=True)
+        confirmed[lone] = near > 1
+    return confirmed
+
+
+def _crossed(surfaces: Floats, resolution: float, origin: Floats) -> Ints:
+    """Return the cells of places along surfaces, half a cell apart.
+
+    Parameters
+    ----------
+    surfaces : ndarray, shape (k, 2, d) [m, map]
+    resolution : float [m]
+    origin : ndarray, shape (d,) [m, map]
+    """
+    along = surfaces[:, 1] - surfaces[:, 0]
+    counts = np.ceil(np.linalg.norm(along, axis=1) / (0.5 * resolution)).astype(np.int64) + 1
+    row = np.repeat(np.arange(len(surfaces)), counts)
+    number = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
+    share = number / np.maximum(np.repeat(counts, counts) - 1, 1)
+    places = surfaces[row, 0] + share[:, None] * along[row]
+    cells = np.floor((places - origin) / resolution).astype(np.int64)[:, ::-1]
+    return np.unique(cells, axis=0)
 
 
 def _corners(ndim: int) -> Floats:

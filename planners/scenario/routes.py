@@ -25,6 +25,7 @@ IN_TRUTH: dict[str, Any] = {
     "planner": "astar",
     "settings": {},
     "unknown": "avoid",
+    "recent": False,
     "time_limit": None,
 }
 
@@ -57,6 +58,7 @@ def run_query(query: QuerySettings, grid: ConfidenceGrid) -> QueryOutcome:
             goal=query.goal,
             footprint=query.footprint,
             unknown=query.unknown,
+            recent=grid.recent if query.recent else None,
         )
         route = plan(problem, query.planner, **settings)
     except PlanningError as error:

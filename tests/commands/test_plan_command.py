@@ -253,10 +253,9 @@ def test_keep_out_areas_of_a_file_close_the_door(wall: Path, tmp_path: Path) -> 
 def test_a_saved_map_is_planned_on_with_what_was_there_when_asked(tmp_path: Path) -> None:
     grid = ConfidenceGrid(resolution=0.2)
     grid.fuse(np.array([0, 0]), np.full((64, 64), -1.0, dtype=np.float32))
-    z = np.zeros((64, 64), dtype=np.float32)
-    z[:, 30:32] = 1.0
-    features = np.column_stack([np.full(64, 6.2), 0.2 * np.arange(64)])
-    grid.recent_views.add(RecentView(np.array([0, 0]), z, None, np.array([1.0, 6.0]), features))
+    wall = np.array([[(6.1, -0.1), (6.1, 12.9)]])
+    none = np.empty((0, 2), dtype=np.int64)
+    grid.recent_views.add(RecentView(wall, np.array([False]), none, np.array([1.0, 6.0])))
     path = tmp_path / "map.npz"
     grid.save(path)
     assert plan(path, start="3,3", goal="12,3").code == 0

@@ -31,7 +31,8 @@ def along_rays(xyz: Floats, sigma: npt.ArrayLike) -> Floats:
     """Return covariances with a standard deviation along the ray, and a centimetre across."""
     rays = xyz / np.linalg.norm(xyz, axis=-1, keepdims=True)
     outer = rays[..., :, None] * rays[..., None, :]
-    return np.eye(3) * 1e-4 + outer * np.square(sigma)[..., None, None]
+    covariance: Floats = np.eye(3) * 1e-4 + outer * np.square(sigma)[..., None, None]
+    return covariance
 
 
 def mapped(

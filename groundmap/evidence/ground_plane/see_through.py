@@ -79,7 +79,7 @@ def contradictions(ground_view: GroundView, surfaces: Surfaces) -> Contradiction
     against[~firm], _ = count(~firm, 0.0)
     made_of = np.array([MADE_OF[kind] for kind in SurfaceKind])[surfaces.kind]
     belief = np.where(against > made_of, made_of / (made_of + against), 1.0)
-    return Contradictions(against, belief, np.count_nonzero(np.bincount(feature[passes])))
+    return Contradictions(against, belief, int(np.count_nonzero(np.bincount(feature[passes]))))
 
 
 def _solid_ends(surfaces: Surfaces) -> Floats:
