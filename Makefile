@@ -36,12 +36,13 @@ demo: $(INSTALLED) ## Map the bundled sample log and plan a route; writes ground
 test: $(READY) ## Run the tests and the doctests
 	$(BIN)/pytest -n $(WORKERS)
 
-check: $(READY) ## Check format, lint, types, import contracts and wording
+check: $(READY) ## Check format, lint, types, import contracts, wording and docstrings
 	$(BIN)/ruff format --check
 	$(BIN)/ruff check
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/codespell -D - -D tools/dialect.txt
+	$(BIN)/python tools/check_docstrings.py
 
 crash-matrix: $(READY) ## Plan random problems in processes that can crash (ATTEMPTS=2000 SEED=7)
 	$(BIN)/python tools/crash_matrix.py --attempts $(ATTEMPTS) $(if $(SEED),--seed $(SEED))

@@ -97,7 +97,7 @@ class GroundMapper:
     >>> for view in fit_ground([view], camera_height=1.5):
     ...     mapper.integrate(view)
     >>> mapper.grid.confidence_at([(3.0, 0.05), (6.0, 0.05)])
-    array([-1.,  0.], dtype=float32)
+    array([-0.25,  0.  ], dtype=float32)
     """
 
     def __init__(self, *, stages: Stopwatch | None = None, **settings: Any) -> None:

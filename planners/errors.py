@@ -375,19 +375,24 @@ class CancelledError(NoRouteError):
     seconds : float [s]
         Since the search began.
     expanded : int
-        Expanded nodes; for sampling planners, checked edges.
+        Effort of the search, in `unit`.
+    unit : str, default "nodes expanded"
+        Sampling planners count "edges checked".
 
     Examples
     --------
-    >>> print(CancelledError("rrtstar", seconds=0.25, expanded=480))
-    rrtstar: cancelled after 0.25 s, before a route was found (480 nodes expanded).
+    >>> print(CancelledError("rrtstar", seconds=0.25, expanded=480, unit="edges checked"))
+    rrtstar: cancelled after 0.25 s, before a route was found (480 edges checked).
     """
 
-    def __init__(self, planner: str, *, seconds: float, expanded: int) -> None:
-        self.planner, self.seconds, self.expanded = planner, seconds, expanded
+    def __init__(
+        self, planner: str, *, seconds: float, expanded: int, unit: str = "nodes expanded"
+    ) -> None:
+        self.planner, self.seconds = planner, seconds
+        self.expanded, self.unit = expanded, unit
         super().__init__(
             f"{planner}: cancelled after {seconds:.2f} s, before a route was found "
-            f"({expanded} nodes expanded)."
+            f"({expanded} {unit})."
         )
 
 

@@ -16,6 +16,7 @@ from planners.costmap.endpoint_check import (
     space_of,
 )
 from planners.costmap.map_space import MapSpace
+from planners.costmap.regions import nearest_cells
 from planners.error_messages import Place, Point, Turning
 from planners.errors import EnclosedError
 from planners.problem.footprint import Footprint
@@ -131,8 +132,8 @@ def _widest(space: MapSpace, place: Place) -> tuple[float, Point | None]:
 
 def _nearest(space: MapSpace, reached: Bools) -> tuple[Point, float]:
     """Return the reached cell centre nearest to the goal and its distance; else the start's."""
-    centres = space.window.cell_to_world(np.argwhere(reached))
-    places = centres if len(centres) else np.array([space.problem.start_xy])
-    distances = np.hypot.reduce(places - space.problem.goal_xy, axis=1)
-    i = int(distances.argmin())
-    return tuple(places[i].tolist()), float(distances[i])
+    start, goal = space.problem.start_xy, space.problem.goal_xy
+    nearest, distance = nearest_cells(space.window, reached, goal)
+    if distance < math.inf:
+        return tuple(nearest.tolist()), distance
+    return start, float(np.hypot.reduce(np.subtract(start, goal)))

@@ -76,7 +76,7 @@ def test_an_unknown_planner_is_refused_with_the_available_names() -> None:
 
 @pytest.mark.parametrize("place", ["start", "goal"])
 @pytest.mark.parametrize("xy", [(1000, 0), (-5, 5), (64.5, -70)])
-def test_places_beyond_the_touched_tiles_are_outside(place: str, xy: tuple[float, float]) -> None:
+def test_places_beyond_the_observed_tiles_are_outside(place: str, xy: tuple[float, float]) -> None:
     where = rf"{place} \({xy[0]:.2f}, {xy[1]:.2f}\)"
     sentence = rf"{where} is outside the map: expected a point on an observed tile.*0.00 to 64.00"
     asked: dict[str, Any] = {place: xy}
@@ -91,7 +91,7 @@ def test_an_empty_map_has_no_inside() -> None:
         plan(problem(ConfidenceGrid()))
 
 
-def test_a_place_between_touched_tiles_is_outside() -> None:
+def test_a_place_between_observed_tiles_is_outside() -> None:
     grid = grid_of(free_field(64, 64))
     grid.fuse(np.array([128, 128]), free_field(64, 64))
     with pytest.raises(OutsideMapError, match=r"goal \(96.00, 96.00\)"):

@@ -21,7 +21,8 @@ def main() -> None:
     """Print each fault with its place; exit with 1 if there is any."""
     files = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
     faults = [fault for path in files if COMMANDS not in path.parents for fault in faults_in(path)]
-    print(*faults, sep="\n")
+    for fault in faults:
+        print(fault)
     print(f"{len(files)} files, {len(faults)} functions without complete Parameters sections")
     sys.exit(bool(faults))
 

@@ -1,4 +1,4 @@
-"""Write docs/settings.md: the settings of every planner, from its settings class.
+"""Write docs/settings.md: the settings of maps, ground planes and planners, from their classes.
 
 Run it from the root of the tree when a setting has changed.
 """
@@ -11,6 +11,7 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
+from groundmap import GroundSettings, MapperSettings
 from planners import OWN_PLANNERS, SamplingSettings
 from planners.sampling.ompl_module import has_parameter, samplers
 from planners.sampling.ompl_parameters import PARAMETERS
@@ -18,14 +19,29 @@ from planners.sampling.settings import refusal
 from planners.search.base import SearchSettings
 
 FILE = Path(__file__).parents[1] / "docs" / "settings.md"
-HEAD = """# Settings of planners
+MAPS = """# Settings
+
+A number out of its range is an error, and so is an unknown setting.
+
+## Maps
+
+`groundmap.GroundMapper(setting=value)`, or the table `[mapper]` of the TOML file of `groundmap map
+--config`.
+"""
+GROUND = """
+## Ground planes
+
+`groundmap.fit_ground(views, setting=value)`, or the table `[ground]` of the same file.
+"""
+PLANNERS = """
+## Planners
 
 `planners.plan(problem, "NAME", setting=value)`, or `groundmap plan --planner NAME --set
 setting=value`. Every planner has the setting `time_limit`: the time from the call to the answer
-[s]; default: 30 s, `none` for no limit. A number out of its range is an error.
+[s]; default: 30 s, `none` for no limit.
 """
 SAMPLING = """
-## Sampling planners
+### Sampling planners
 
 All sampling planners have these settings:
 """
@@ -37,10 +53,11 @@ except for `range`, whose default depends on the map.
 
 def document() -> str:
     """Return the text of the file."""
-    parts = [HEAD]
+    parts = [MAPS, table(MapperSettings.model_fields), GROUND]
+    parts += [table(GroundSettings.model_fields), PLANNERS]
     for name, entry in sorted(OWN_PLANNERS.items()):
         if fields := own_fields(entry.settings):
-            parts += [f"\n## {name}\n", table(fields)]
+            parts += [f"\n### {name}\n", table(fields)]
     fields = own_fields(SamplingSettings)
     parts += [SAMPLING, table({k: v for k, v in fields.items() if k not in PARAMETERS})]
     parts += [OWN, table({k: fields[k] for k in PARAMETERS}, takers)]
@@ -78,7 +95,7 @@ def format_default(value: Any) -> str:
 
 def format_range(field: FieldInfo) -> str:
     """Return the range of a number."""
-    limits = {"ge": "≥ {:g}", "gt": "> {:g}", "le": "≤ {:g}", "lt": "< {:g}"}
+    limits = {"ge": "≥ {:.10g}", "gt": "> {:.10g}", "le": "≤ {:.10g}", "lt": "< {:.10g}"}
     texts = [
         text.format(getattr(rule, kind))
         for rule in field.metadata

@@ -61,7 +61,7 @@ def known_bounds(grid: ConfidenceGrid, *, margin: float = 1.0) -> Floats:
     if not boxes:
         raise InputError("grid", "at least one known cell", "an empty map")
     lowest, highest = np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]
-    # From the corner of the first tile, with the rounding of a window around all tiles.
+    # From the corner of the first tile, with the rounding of a window around the observed tiles.
     first = grid.cell_bounds()[0]
     corner = grid.origin + first[::-1] * grid.resolution
     low = corner + (lowest - first)[::-1] * grid.resolution

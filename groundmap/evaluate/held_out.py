@@ -181,7 +181,7 @@ def cells_around(
     Parameters
     ----------
     window : GridWindow
-    points : ndarray, shape (n, 2) [m, map]
+    points : ndarray, shape (n, d) [m, map]
     radius : float [m]
         The box contains all cells within this distance.
     to_centre : bool, default False
@@ -189,12 +189,14 @@ def cells_around(
 
     Yields
     ------
-    cells : ndarray, shape (b, k, 2)
-        ``[row, col]``, also of cells outside the window.
+    cells : ndarray, shape (b, k, d)
+        ``[row, col]``, in 3-D ``[layer, row, col]``, also of cells outside the window.
     distances : ndarray, shape (b, k) [m]
     """
     steps = int(np.ceil(radius / window.resolution)) + 1
-    offsets = np.stack(np.meshgrid(*[np.arange(-steps, steps + 1)] * 2), axis=-1).reshape(-1, 2)
+    axes = len(window.origin)
+    lattice = np.meshgrid(*[np.arange(-steps, steps + 1)] * axes)
+    offsets = np.stack(lattice, axis=-1).reshape(-1, axes)
     block = max(1, CELLS_AT_ONCE // len(offsets))
     for first in range(0, len(points), block):
         part = points[first : first + block]
@@ -203,7 +205,7 @@ def cells_around(
         offset = np.abs(part[:, None, :] - centres)
         if not to_centre:
             offset = np.maximum(offset - 0.5 * window.resolution, 0.0)
-        yield cells, np.hypot(offset[..., 0], offset[..., 1])
+        yield cells, np.hypot.reduce(offset, axis=-1)
 
 
 def near_nonfree(window: GridWindow, states: Bytes, points: Floats) -> Bools:
@@ -212,9 +214,9 @@ def near_nonfree(window: GridWindow, states: Bytes, points: Floats) -> Bools:
     Parameters
     ----------
     window : GridWindow
-    states : ndarray, shape (rows, cols)
+    states : ndarray, shape (rows, cols) or (layers, rows, cols)
         `CellState` of the cells of the window.
-    points : ndarray, shape (n, 2) [m, map]
+    points : ndarray, shape (n, d) [m, map]
     """
     near = [np.empty(0, dtype=np.bool_)]
     for cells, distance in cells_around(window, points, NEAR):

@@ -62,7 +62,8 @@ def _sightings(views: Iterable[View]) -> tuple[Floats, Floats, Ints]:
         rotation = view.T_map_camera[:2, :3]
         covariance = rotation @ view.points.covariance @ rotation.T
         places.append(view.points.xyz @ rotation.T + view.T_map_camera[:2, 3])
-        inverse.append(np.linalg.inv(covariance + 1e-4 * np.eye(2)))  # a centimetre of the pose
+        uncertain: Floats = covariance + 1e-4 * np.eye(2)  # a centimetre of the pose
+        inverse.append(np.linalg.inv(uncertain).astype(np.float64))
         ids.append(view.points.ids)
     return np.concatenate(places), np.concatenate(inverse), np.concatenate(ids)
 

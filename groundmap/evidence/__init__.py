@@ -1,1 +1,1 @@
-"""What one view says about the cells around it."""
+"""Evidence: free and non-free values of the cells around one view."""

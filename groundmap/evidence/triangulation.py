@@ -1,4 +1,4 @@
-"""Constrained Delaunay triangulation: every segment becomes a chain of edges."""
+"""Constrained Delaunay triangulation with segments as chains of edges."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from groundmap.errors import InputError
 MERGE_DISTANCE = 1e-3  # [m], nearer points are one vertex
 FARTHEST = 1e12  # [m] from the origin
 NINE_SQUARES = [(i, j) for i in (-1.0, 0.0, 1.0) for j in (-1.0, 0.0, 1.0)]
-NODING_GRID = 1e-3  # [m], where crossings snap to if the library can't resolve them
+NODING_GRID = 1e-3  # [m], lattice for crossings that the library does not resolve
 
 
 class Mesh(NamedTuple):
@@ -34,26 +34,26 @@ class Mesh(NamedTuple):
 
 
 def triangulate(points: npt.ArrayLike, segments: npt.ArrayLike = ()) -> Mesh:
-    """Triangulate points so that every segment is a chain of edges.
+    """Return the triangulation of points in which every segment is a chain of edges.
 
     Parameters
     ----------
     points : array_like, shape (n, 2) [m]
         Points within a millimetre of each other become one vertex.
     segments : array_like of int, shape (m, 2)
-        Rows of `points`. Crossing segments are split at the crossing, overlapping ones share
-        edges, those whose ends are one vertex vanish.
+        Rows of `points`. Crossing segments are split at the crossing; overlapping segments share
+        edges; segments whose ends are one vertex are dropped.
 
     Raises
     ------
     InputError
-        NaN or infinity, a point beyond 1e12 m, or a segment that names no point.
+        A coordinate is NaN, infinite or beyond 1e12 m, or a segment names no point.
 
     Notes
     -----
     Paper, section 3, with the ground plane in place of the image plane (section 7). Fewer than
-    three points, or all on one line, are a defined result: no triangles, and as edges the
-    neighbours along the line.
+    three points, or points on one line, have no triangles; their edges link neighbours along the
+    line.
 
     Examples
     --------
@@ -62,10 +62,10 @@ def triangulate(points: npt.ArrayLike, segments: npt.ArrayLike = ()) -> Mesh:
     (5, 4)
     """
     xy = as_floats("points", points, (None, 2))
-    # The library never returns from infinite coordinates, so this check comes first.
+    # The library does not return for infinite coordinates or products that overflow.
     check_finite("points", xy)
     far = np.abs(xy) > FARTHEST
-    if far.any():  # nor from such whose products overflow
+    if far.any():
         row = int(np.argwhere(far)[0, 0])
         expected = f"coordinates within {FARTHEST:g} m"
         raise InputError("points", expected, str(xy[row].tolist()), where=f"row {row}")
@@ -86,7 +86,7 @@ def triangulate(points: npt.ArrayLike, segments: npt.ArrayLike = ()) -> Mesh:
     constraints = np.unique(constraints[constraints[:, 0] != constraints[:, 1]], axis=0)
     try:
         return _insert(vertices, constraints, source)
-    except RuntimeError:  # a crossing that falls on a vertex but for rounding, as on a lattice
+    except RuntimeError:  # a crossing that coincides with a vertex up to rounding
         return _node_segments(vertices, constraints, source)
 
 
@@ -104,10 +104,10 @@ def _nothing() -> Mesh:
 
 
 def _merge_duplicates(xy: Floats) -> tuple[Floats, Ints]:
-    """Return the vertices and, for each point, which one it became.
+    """Return the vertices and, for each point, the number of its vertex.
 
-    The first of a group of near points stands for all within a millimetre of itself, so that no
-    point moves farther than that, however long a chain of near points is.
+    The first of a group of near points replaces those within a millimetre of it. No point moves
+    farther, even in long chains of near points.
     """
     _, first, group = np.unique(xy, axis=0, return_index=True, return_inverse=True)
     distinct = np.sort(first)
@@ -119,15 +119,15 @@ def _merge_duplicates(xy: Floats) -> tuple[Floats, Ints]:
 
 
 def _first_nearby(xy: Floats) -> Ints:
-    """Return, for each of distinct points, the first of those kept within a millimetre, or itself.
+    """Return, for each of distinct points, the first kept point within a millimetre, or itself.
 
-    A point is kept if none before it was kept that near.
+    A point is kept if no earlier point within a millimetre is kept.
     """
     stands_for = np.arange(len(xy))
-    # A little farther than asked for, as the search leaves out what lies on its bound.
+    # Twice the distance, as the search excludes points on its bound.
     apart, _ = KDTree(xy).query(xy, k=[2], distance_upper_bound=2 * MERGE_DISTANCE)
     crowded = np.flatnonzero(np.isfinite(apart[:, 0]))
-    # At most four of those kept fit into a square of a millimetre, so that each point meets few.
+    # A square of a millimetre holds at most four kept points, which bounds the work per point.
     squares = np.floor(xy[crowded] / MERGE_DISTANCE).tolist()
     kept: dict[tuple[float, float], list[tuple[int, float, float]]] = {}
     for point, (x, y), (col, row) in zip(
@@ -150,18 +150,18 @@ def _insert(vertices: Floats, constraints: Ints, source: Ints) -> Mesh:
     library = cdt.Triangulation(
         cdt.VertexInsertionOrder.AUTO, cdt.IntersectingConstraintEdges.TRY_RESOLVE, 0.0
     )
-    corners: Any = np.ascontiguousarray(vertices)  # Any: its stubs want a Buffer, arrays are one
+    corners: Any = np.ascontiguousarray(vertices)  # Any: the stubs expect a Buffer
     library.insert_vertices(corners)
     pairs: Any = np.ascontiguousarray(constraints, dtype=np.uintc)
     library.insert_edges(pairs)
     library.erase_super_triangle()
-    found = library.vertices_array()
-    points = np.column_stack([found["x"], found["y"]])
+    nodes = library.vertices_array()
+    points = np.column_stack([nodes["x"], nodes["y"]])
     triangles = library.triangles_array()
     simplices = triangles["vertices"].astype(np.int64).reshape(-1, 3)
     across = triangles["neighbors"].astype(np.int64).reshape(-1, 3)
     across[across == cdt.NO_NEIGHBOR] = -1
-    # The library stores the neighbour across edge (i, i + 1), scipy the one opposite to corner i.
+    # The library stores the neighbour across edge (i, i + 1), scipy the one opposite corner i.
     neighbors = across[:, [1, 2, 0]]
     fixed = np.array([(e.v1, e.v2) for e in library.fixed_edges_iter()], dtype=np.int64)
     fixed = np.sort(fixed.reshape(-1, 2), axis=1)
@@ -179,11 +179,11 @@ def _insert(vertices: Floats, constraints: Ints, source: Ints) -> Mesh:
 
 
 def _edges(points: Floats, simplices: Ints, across: Ints, fixed: Ints) -> tuple[Ints, Bools]:
-    """Return each edge once, and which are pieces of segments."""
+    """Return each edge once, and which edges are pieces of segments."""
     if len(simplices) == 0:
         edges = np.concatenate([_along_line(points), fixed])
     else:
-        # An edge between two triangles is taken from the one with the higher number.
+        # An edge between two triangles is taken from the triangle with the higher number.
         own = across < np.arange(len(simplices))[:, None]
         edges = np.stack([simplices, simplices[:, [1, 2, 0]]], axis=-1)[own]
         edges = np.concatenate([np.sort(edges, axis=1), fixed])
@@ -194,7 +194,7 @@ def _edges(points: Floats, simplices: Ints, across: Ints, fixed: Ints) -> tuple[
 
 
 def _along_line(points: Floats) -> Ints:
-    """Return the neighbours along the line that all points lie on."""
+    """Return the pairs of neighbours of points on one line."""
     if len(points) < 2:
         return np.empty((0, 2), dtype=np.int64)
     spread = points - points.mean(axis=0)
@@ -204,7 +204,7 @@ def _along_line(points: Floats) -> Ints:
 
 
 def _crossings(library: cdt.Triangulation) -> list[tuple[int, int, int]]:
-    """Return (vertex, a, b) for vertices inside segments: where these cross, and points on them."""
+    """Return (vertex, a, b) for crossings and points inside a segment a-b."""
     return sorted(
         {
             (vertex, original.v1, original.v2)
@@ -217,7 +217,7 @@ def _crossings(library: cdt.Triangulation) -> list[tuple[int, int, int]]:
 
 
 def _node_segments(vertices: Floats, constraints: Ints, source: Ints) -> Mesh:
-    """Triangulate on a millimetre lattice, with the segments split where they meet (shapely)."""
+    """Triangulate on a millimetre lattice, with segments split by shapely where they meet."""
     lattice = np.round(vertices / NODING_GRID)
     lines = shapely.linestrings(lattice[constraints])
     lines = lines[shapely.length(lines) > 0]
@@ -225,7 +225,7 @@ def _node_segments(vertices: Floats, constraints: Ints, source: Ints) -> Mesh:
     corners, part = shapely.get_coordinates(pieces, return_index=True)
     everything = np.concatenate([lattice, corners])
     _, first, group = np.unique(everything, axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(first)  # inputs stay in front of crossings
+    order = np.argsort(first)  # inputs precede crossings
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
     vertex = rank[group.reshape(-1)]
@@ -234,13 +234,13 @@ def _node_segments(vertices: Floats, constraints: Ints, source: Ints) -> Mesh:
     mesh = _insert(everything[first[order]], np.unique(edges, axis=0), vertex[source])
     on, a, b = _segments_through(mesh.points, lattice, constraints).T
     a, b = vertex[a], vertex[b]
-    inside = (on != a) & (on != b) & (a != b)  # ends may have fallen on one node
+    inside = (on != a) & (on != b) & (a != b)  # ends may coincide on the lattice
     crossings = np.stack([on, a, b], axis=1)[inside]
     return mesh._replace(points=mesh.points * NODING_GRID, crossings=crossings)
 
 
 def _segments_through(points: Floats, lattice: Floats, constraints: Ints) -> Ints:
-    """Return (point, a, b) for every segment a-b that passes a lattice point within one unit."""
+    """Return (point, a, b) for every segment a-b within one unit of a lattice point."""
     lines = shapely.STRtree(shapely.linestrings(lattice[constraints]))
     point, line = lines.query(shapely.points(points), predicate="dwithin", distance=1.0)
     order = np.lexsort((line, point))

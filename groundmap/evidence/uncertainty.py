@@ -1,4 +1,4 @@
-"""Uncertainty models: over which cells a surface spreads, by name (paper, section 6.2)."""
+"""Uncertainty models, by name: the spread of surfaces over cells (paper, section 6.2)."""
 
 from __future__ import annotations
 
@@ -8,16 +8,15 @@ import numpy as np
 
 from groundmap.arrays import Floats
 
-PEAK = 4.0  # z on a surface, of that around it
+PEAK = 4.0  # ratio of z on a surface to z around it
 
 
 class Ellipsoid:
     """The third solution of the paper: a constant-density ellipse along the feature's covariance.
 
-    Around the surface, z is such that a ray through the spread adds up to one cell of surface. On
-    the surface itself it is four times as much, but 1 at most: with a spread of two standard
-    deviations, 1 up to a standard deviation of one cell, and less the less is known of where the
-    surface is.
+    Around the surface, z along a ray through the spread sums to one cell of surface. On the
+    surface, z is four times as high, but at most 1: with a spread of two standard deviations, it
+    is 1 up to a standard deviation of one cell, and decreases with larger ones.
     """
 
     name: ClassVar[str] = "ellipsoid"
@@ -32,15 +31,15 @@ class Ellipsoid:
         """
         ray = _unit(xy)
         variance = np.einsum("ni,nij,nj->n", ray, covariance, ray)
-        sigma: Floats = np.sqrt(np.maximum(variance, 0.0))  # rounded, it may be a little below 0
+        sigma: Floats = np.sqrt(np.maximum(variance, 0.0))  # rounding may give values below 0
         return sigma
 
     def core_radius(self, resolution: float) -> float:
-        """Return the half-width of what a lone point spreads from: its own cell [m]."""
+        """Return the half-width of the core of a lone point, half a cell [m]."""
         return 0.5 * resolution
 
     def outline(self, ends: Floats, reach: Floats) -> Floats:
-        """Return the quadrangle that a surface spreads over, shape (s, 4, 2) [m, view].
+        """Return the quadrangle over which a surface spreads, shape (s, 4, 2) [m, view].
 
         Parameters
         ----------
@@ -49,7 +48,7 @@ class Ellipsoid:
         """
         radius = np.hypot(ends[..., 0], ends[..., 1])
         ray = _unit(ends)
-        # However unsure, a feature is in front of the viewpoint, not behind it.
+        # An uncertain feature, too, is in front of the viewpoint.
         near = ends - ray * np.minimum(reach, radius)[..., None]
         return _quadrangle(near, ends + ray * reach[..., None])
 
@@ -58,7 +57,13 @@ class Ellipsoid:
         return np.zeros_like(reach)
 
     def evidence(self, reach: Floats, resolution: float) -> tuple[Floats, Floats]:
-        """Return z on the surface and in the spread around it, shape (s,) each."""
+        """Return z on the surface and in the spread around it, shape (s,) each.
+
+        Parameters
+        ----------
+        reach : ndarray, shape (s, 2) [m]
+        resolution : float [m]
+        """
         density = _constant_density(reach, resolution)
         return np.minimum(PEAK * density, 1.0), density
 
@@ -69,16 +74,28 @@ class Radius(Ellipsoid):
     name: ClassVar[str] = "radius"
 
     def sigma(self, xy: Floats, covariance: Floats) -> Floats:
-        """Return the standard deviation in each feature's least certain direction [m]."""
+        """Return the standard deviation in each feature's least certain direction [m].
+
+        Parameters
+        ----------
+        xy : ndarray, shape (n, 2) [m, view]
+        covariance : ndarray, shape (n, 2, 2) [m², view]
+        """
         sigma: Floats = np.sqrt(np.linalg.eigvalsh(covariance)[:, -1])
         return sigma
 
     def core_radius(self, resolution: float) -> float:
-        """Return 0 [m]: the caps alone spread a lone point to all sides alike."""
+        """Return 0 [m], as the caps spread a lone point equally in all directions."""
         return 0.0
 
     def outline(self, ends: Floats, reach: Floats) -> Floats:
-        """Return the quadrangle across the surface, shape (s, 4, 2) [m, view]."""
+        """Return the quadrangle across the surface, shape (s, 4, 2) [m, view].
+
+        Parameters
+        ----------
+        ends : ndarray, shape (s, 2, 2) [m, view]
+        reach : ndarray, shape (s, 2) [m]
+        """
         along = _unit(ends[:, 1] - ends[:, 0])
         across = np.stack([-along[:, 1], along[:, 0]], axis=1)
         offset = across[:, None, :] * reach[..., None]
@@ -89,18 +106,30 @@ class Radius(Ellipsoid):
         return reach
 
     def evidence(self, reach: Floats, resolution: float) -> tuple[Floats, Floats]:
-        """Return z on the surface and around it, the same by the definition of this model."""
+        """Return z on the surface and around it, which are equal in this model, shape (s,) each.
+
+        Parameters
+        ----------
+        reach : ndarray, shape (s, 2) [m]
+        resolution : float [m]
+        """
         density = _constant_density(reach, resolution)
         return density, density
 
 
 class Exact(Ellipsoid):
-    """The first solution: no spread; over many views the places average out."""
+    """The first solution: no spread; errors average out over many views."""
 
     name: ClassVar[str] = "none"
 
     def sigma(self, xy: Floats, covariance: Floats) -> Floats:
-        """Return zeros: every feature is taken to be where it was measured."""
+        """Return zeros, shape (n,) [m], as this model ignores the uncertainty of features.
+
+        Parameters
+        ----------
+        xy : ndarray, shape (n, 2) [m, view]
+        covariance : ndarray, shape (n, 2, 2) [m², view]
+        """
         return np.zeros(len(xy))
 
 

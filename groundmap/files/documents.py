@@ -53,7 +53,7 @@ def read_toml(path: str | PathLike[str], expected: str = "a TOML file") -> dict[
         if DOTTED_KEY.search(text):
             raise WrongDocumentError(f"a key of more than {MOST_PARTS} parts")
         content = _parse_text(tomllib.loads, text)
-        _check(content, "TOML")
+        check_values(content, MOST_VALUES["TOML"])
     except WrongDocumentError as error:
         raise FileFormatError(path, "a TOML file", str(error), line=error.line) from error
     assert isinstance(content, dict)
@@ -79,13 +79,18 @@ def read_yaml(path: str | PathLike[str], expected: str = "a YAML file") -> Any:
     text = _text(path, "YAML", expected)
     try:
         content = _parse_text(_load_yaml, text)
-        _check(content, "YAML")
+        check_values(content, MOST_VALUES["YAML"])
     except WrongDocumentError as error:
         raise FileFormatError(path, "YAML", str(error), line=error.line) from error
     return content
 
 
-def read_json(path: str | PathLike[str], expected: str = "a JSON file") -> Any:
+def read_json(
+    path: str | PathLike[str],
+    expected: str = "a JSON file",
+    *,
+    most: int = MOST_BYTES["JSON"],
+) -> Any:
     """Return the content of a JSON file; the module describes the possible values.
 
     Parameters
@@ -93,21 +98,28 @@ def read_json(path: str | PathLike[str], expected: str = "a JSON file") -> Any:
     path : path
     expected : str
         Kind of file that is expected, for error messages.
+    most : int, default 2**24
+        Largest size [bytes]; a value has at least two.
 
     Raises
     ------
     FileFormatError
         The file is missing, too large or not JSON, or is nested too deeply.
     """
-    text = _text(path, "JSON", expected)
+    text = _text(path, "JSON", expected, most=most)
     try:
-        return parse_json(text)
+        return parse_json(text, most_values=max(MOST_VALUES["JSON"], most // 2))
     except WrongDocumentError as error:
         raise FileFormatError(path, "JSON", str(error), line=error.line) from error
 
 
-def parse_json(text: str) -> Any:
+def parse_json(text: str, *, most_values: int = MOST_VALUES["JSON"]) -> Any:
     """Return the content of a JSON text; the module describes the possible values.
+
+    Parameters
+    ----------
+    text : str
+    most_values : int, default 10**7
 
     Raises
     ------
@@ -120,12 +132,12 @@ def parse_json(text: str) -> Any:
     {'origin': [0, 2.5]}
     """
     content = _parse_text(json.loads, text)
-    _check(content, "JSON")
+    check_values(content, most_values)
     return content
 
 
-def _text(path: str | PathLike[str], kind: str, expected: str) -> str:
-    content = read_file(path, expected, most=MOST_BYTES[kind])
+def _text(path: str | PathLike[str], kind: str, expected: str, *, most: int | None = None) -> str:
+    content = read_file(path, expected, most=most or MOST_BYTES[kind])
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -155,15 +167,27 @@ def _parse_text(parse: Any, text: str) -> Any:
         raise WrongDocumentError(f"something else ({error})") from error
 
 
-def _check(content: Any, kind: str) -> None:
-    """Check every value, without recursion."""
+def check_values(content: Any, most: int) -> None:
+    """Check every value of a document, without recursion.
+
+    Parameters
+    ----------
+    content : object
+    most : int
+        Largest number of values.
+
+    Raises
+    ------
+    WrongDocumentError
+        More values, more than 64 levels of nesting, or a value of another kind.
+    """
     pending: list[tuple[Any, int]] = [(content, 0)]
     count = 0
     while pending:
         value, depth = pending.pop()
         count += 1
-        if count > MOST_VALUES[kind]:
-            raise WrongDocumentError(f"more than {MOST_VALUES[kind]} values")
+        if count > most:
+            raise WrongDocumentError(f"more than {most} values")
         if isinstance(value, dict):
             parts: list[Any] = [*value, *value.values()]
         elif isinstance(value, list):

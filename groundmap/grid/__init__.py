@@ -1,1 +1,1 @@
-"""What is known: cells, tiles, files of maps, and the update rules."""
+"""The confidence grid: tiles, height layers, update rules and map files."""

@@ -1,4 +1,4 @@
-"""Boxes of cells: which cells a box of the map holds, and whether they are too many."""
+"""Boxes of cells: conversion from map coordinates, and checks of their size."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ CELL_BYTES = sum(np.dtype(kind).itemsize for kind in LAYERS.values())
 
 
 def cells_of_box(bounds: npt.ArrayLike, origin: Floats, resolution: float) -> tuple[Ints, Ints]:
-    """Return the first cell that a box touches and the cell past the last.
+    """Return the range of cells that a box overlaps: the first cell and the cell past the last.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def cells_of_box(bounds: npt.ArrayLike, origin: Floats, resolution: float) -> tu
     Raises
     ------
     InputError
-        Bounds that are not finite, or whose upper corner is not above the lower.
+        The bounds are not finite, or the upper corner is not above the lower.
     """
     ndim = len(origin)
     box = as_floats("bounds", bounds, (2 * ndim,))
@@ -41,12 +41,19 @@ def cells_of_box(bounds: npt.ArrayLike, origin: Floats, resolution: float) -> tu
 
 
 def check_size(lower: Ints, upper: Ints, most_cells: int, resolution: float) -> None:
-    """Check how many cells a box holds, before memory is asked for.
+    """Check the number of cells in a box before allocation.
+
+    Parameters
+    ----------
+    lower, upper : ndarray of int, shape (d,)
+        First cell of the box and the cell past its last.
+    most_cells : int
+    resolution : float [m]
 
     Raises
     ------
     InputError
-        More than `most_cells`.
+        The box has more than `most_cells` cells.
     """
     if _count(lower, upper) > most_cells:
         raise InputError(
@@ -58,12 +65,20 @@ def check_size(lower: Ints, upper: Ints, most_cells: int, resolution: float) -> 
 
 
 def check_whole(tiles: Tiles, most_cells: int, origin: Floats, resolution: float) -> None:
-    """Check how many cells the box around all tiles holds, before memory is asked for.
+    """Check the number of cells in the box around the observed tiles before allocation.
+
+    Parameters
+    ----------
+    tiles : Tiles
+    most_cells : int
+    origin : ndarray, shape (d,) [m, map]
+    resolution : float [m]
 
     Raises
     ------
     InputError
-        More than `most_cells`; tiles far from the rest are named, and bounds without them.
+        The box has more than `most_cells` cells. The message names tiles that lie far from the
+        others, and bounds that exclude them.
     """
     lower, upper = tiles.cell_bounds()
     if _count(lower, upper) <= most_cells:
@@ -86,11 +101,12 @@ def check_whole(tiles: Tiles, most_cells: int, origin: Floats, resolution: float
             outwards = np.concatenate([np.floor(10 * main[0]), np.ceil(10 * main[1])]) / 10
             advice += ", without them " + ",".join(f"{value:.1f}" for value in outwards)
     size = _size(lower, upper, resolution)
-    raise InputError("map", f"{_expected(most_cells)} around all tiles", size, hint=f"{advice}.")
+    expected = f"{_expected(most_cells)} around the observed tiles"
+    raise InputError("map", expected, size, hint=f"{advice}.")
 
 
 def _count(lower: Ints, upper: Ints) -> int:
-    return math.prod((upper - lower).tolist())  # in Python's numbers, which do not overflow
+    return math.prod((upper - lower).tolist())  # Python's int does not overflow
 
 
 def _expected(most_cells: int) -> str:
@@ -109,14 +125,14 @@ def _fits(indices: Ints, shape: tuple[int, ...], most_cells: int) -> bool:
 
 
 def _box(indices: Ints, shape: tuple[int, ...], origin: Floats, resolution: float) -> Floats:
-    """Return the box around tiles, lower and upper corner: shape (2, d) [m, map]."""
+    """Return the bounding box of tiles, lower and upper corner, shape (2, d) [m, map]."""
     corners = np.stack([indices.min(axis=0), indices.max(axis=0) + 1]) * shape
     box: Floats = origin + corners[:, ::-1] * resolution
     return box
 
 
 def _apart(boxes: Floats, main: Floats) -> Floats:
-    """Return the distance of boxes, shape (n, 2, d), from another, shape (2, d) [m]."""
+    """Return the distances of boxes, shape (n, 2, d), from one box, shape (2, d) [m]."""
     gaps = np.maximum(np.maximum(boxes[:, 0] - main[1], main[0] - boxes[:, 1]), 0.0)
     apart: Floats = np.sqrt((gaps**2).sum(axis=1))
     return apart

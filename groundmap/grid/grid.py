@@ -1,4 +1,4 @@
-"""The confidence grid: tile-sparse, of any dimension, lossless."""
+"""The confidence grid: sparse, in 2 or 3 dimensions."""
 
 from __future__ import annotations
 
@@ -9,36 +9,29 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import (
-    Counts,
-    Floats,
-    Floats32,
-    Ints,
-    as_cell,
-    as_cells,
-    as_floats,
-    check_finite,
-    is_number,
+from groundmap.arrays import Counts, Floats, Floats32, Ints, as_cell
+from groundmap.errors import InputError
+from groundmap.grid.arguments import (
+    as_evidence,
+    as_origin,
+    as_resolution,
+    check_frame,
+    check_merge,
 )
-from groundmap.errors import FileFormatError, InputError, MergeError
-from groundmap.files.archive import read_archive, write_archive
 from groundmap.grid.cell_set import CellSet
 from groundmap.grid.extents import cells_of_box, check_size, check_whole
-from groundmap.grid.fusion import Average, UpdateRule, rule_from
+from groundmap.grid.fusion import Average, UpdateRule
+from groundmap.grid.grid_files import GridContent, read_grid, write_grid
 from groundmap.grid.height_layers import SIGHT_HEIGHTS, HeightLayers, as_heights
-from groundmap.grid.old_versions import upgrade
 from groundmap.grid.recent_views import RecentViews
-from groundmap.grid.tiles import LAYERS, TILE_SHAPES, Index, Tile, Tiles
-from groundmap.grid.window import CellState, GridWindow, cells_of
-from groundmap.printable import format_value, is_plain
+from groundmap.grid.tiles import Index, Tile, Tiles
+from groundmap.grid.window import CellBox, CellState, GridWindow, cells_of
 
-FORMAT, VERSION = "groundmap-grid", 2
-SMALLEST, LARGEST, FARTHEST = 1e-9, 1e9, 1e100  # [m] cells and origin; areas are then numbers
 MOST_CELLS = 2**28  # of a dense window: 2 GiB
 
 
 class ConfidenceGrid:
-    """Confidence and update count per cell, held in tiles that exist where something was seen.
+    """Confidence and update count per cell, stored in tiles; only observed tiles are allocated.
 
     Parameters
     ----------
@@ -47,15 +40,16 @@ class ConfidenceGrid:
     origin : sequence of float, default (0, 0)
         Outer corner of cell (0, 0) [m, map]; its length is the grid's dimension (2 or 3).
     frame : str, default "map"
+        Name of the coordinate frame.
     rule : UpdateRule, optional
-        How views add up; default: `groundmap.grid.fusion.Average`.
+        Rule that adds views; default: `groundmap.grid.fusion.Average`.
     heights : tuple of float, default (0.05, 0.15, 0.6) [m]
-        Heights that evidence is kept apart by, see `groundmap.grid.height_layers.HeightLayers`.
+        Heights of the evidence layers, see `groundmap.grid.height_layers.HeightLayers`.
 
     Raises
     ------
     InputError
-        A resolution that is not above zero, an origin that is not finite or not 2-D or 3-D.
+        The resolution is not above zero, or the origin is not finite or not 2-D or 3-D.
 
     Examples
     --------
@@ -75,30 +69,15 @@ class ConfidenceGrid:
         rule: UpdateRule | None = None,
         heights: tuple[float, ...] = SIGHT_HEIGHTS,
     ) -> None:
-        if not isinstance(frame, str):
-            raise InputError("frame", "a name", format_value(frame))
-        if not is_plain(frame):
-            raise InputError(
-                "frame", "a name without NUL and unpaired surrogates", format_value(frame)
-            )
-        if not (is_number(resolution) and resolution > 0):
-            raise InputError("resolution", "a number above 0 [m]", format_value(resolution))
-        if not SMALLEST <= resolution <= LARGEST:
-            raise InputError("resolution", f"{SMALLEST:g} to {LARGEST:g} m", str(resolution))
-        self.origin = as_floats("origin", origin, (None,))
-        if len(self.origin) not in TILE_SHAPES:
-            raise InputError("origin", "2 or 3 numbers [m]", f"{len(self.origin)}")
-        self.resolution = float(resolution)
-        check_finite("origin", self.origin)
-        if (np.abs(self.origin) > FARTHEST).any():
-            raise InputError("origin", f"numbers up to {FARTHEST:g} m", str(self.origin.tolist()))
+        check_frame(frame)
         self.frame, self.rule = frame, rule or Average()
+        self.resolution, self.origin = as_resolution(resolution), as_origin(origin)
         self._tiles = Tiles(len(origin))
         self._layers = HeightLayers(len(origin), heights)
         #: The newest views, see `recent`; not saved, copied or merged.
         self.recent_views = RecentViews()
         self._saved_recent: Ints = np.empty((0, len(origin)), dtype=np.int64)
-        #: Base poses the map was seen from, shape (n, 3): x, y [m], yaw [rad], frame map.
+        #: Base poses of the views, shape (n, 3): x, y [m], yaw [rad], in the map frame.
         self.trajectory: Floats = np.empty((0, 3))
 
     @property
@@ -108,21 +87,21 @@ class ConfidenceGrid:
 
     @property
     def tile_shape(self) -> tuple[int, ...]:
-        """Cells of a tile along each axis."""
+        """Number of cells of a tile along each axis."""
         return self._tiles.shape
 
     @property
     def nbytes(self) -> int:
-        """Memory held by the tiles [bytes]."""
+        """Memory of the tiles [bytes]."""
         return self._tiles.nbytes + self._layers.nbytes
 
     @property
     def heights(self) -> tuple[float, ...]:
-        """Heights that evidence is kept apart by [m]."""
+        """Heights of the evidence layers [m]."""
         return self._layers.heights
 
     def tile(self, index: Index) -> Tile:
-        """Return the tile of that index, allocated on first touch: evidence of any height."""
+        """Return a tile, with evidence of all heights; it is allocated if it does not exist."""
         if np.ndim(index) != 1:
             raise InputError("index", f"{self.ndim} whole numbers", repr(index)[:60])
         return self._tiles.touch(tuple(as_cell("index", index, self.ndim).tolist()))
@@ -132,22 +111,22 @@ class ConfidenceGrid:
         return self._tiles.items()
 
     def has_tile(self, index: Index) -> bool:
-        """Whether the tile of that index was touched."""
+        """Whether the tile of an index exists."""
         return self._tiles.get(index) is not None
 
     def layer_tiles(self, layer: int) -> Iterator[tuple[Index, Tile]]:
-        """Iterate over (index, tile) of the evidence below one of `heights`, in their order."""
+        """Iterate over (index, tile) of a layer of `heights`, in the order of the indices."""
         return self._layers.tiles(layer)
 
     def confidence_at(self, xy: npt.ArrayLike) -> float | Floats32:
-        """Return the confidence at map positions (x, y) [m]; 0 where nothing was seen."""
+        """Return the confidence at map positions (x, y) [m]; 0 where unknown."""
         cells = cells_of(xy, self.origin, self.resolution)
         values: Floats32 = self._tiles.values_at(cells, "confidence")
         self._layers.raise_at(values, cells)
         return float(values[0]) if np.ndim(xy) == 1 else values
 
     def count_at(self, xy: npt.ArrayLike) -> int | Counts:
-        """Return the update count at map positions (x, y) [m]; 0 is unknown."""
+        """Return the update count at map positions (x, y) [m]; 0 where unknown."""
         cells = cells_of(xy, self.origin, self.resolution)
         values: Counts = self._tiles.values_at(cells, "count")
         return int(values[0]) if np.ndim(xy) == 1 else values
@@ -171,24 +150,59 @@ class ConfidenceGrid:
         return confidence
 
     def cell_bounds(self) -> tuple[Ints, Ints]:
-        """Return the first cell of the touched tiles and the cell past the last."""
+        """Return the first cell of the observed tiles and the cell past the last."""
         return self._tiles.cell_bounds()
 
     def bounds(self) -> Floats:
-        """Return the box around the touched tiles: lower then upper corner [m, map]."""
+        """Return the bounding box of the observed tiles: lower then upper corner [m, map]."""
         lower, upper = self.cell_bounds()
         corners = np.concatenate([lower[::-1], upper[::-1]]).astype(np.float64)
         return np.tile(self.origin, 2) + corners * self.resolution
 
     def check_extent(self, most_cells: int = MOST_CELLS) -> None:
-        """Check that the box around all touched tiles holds no more than `most_cells` cells.
+        """Check that the bounding box of the observed tiles has at most `most_cells` cells.
 
         Raises
         ------
         InputError
-            It holds more; tiles that lie far from the rest are named, and bounds without them.
+            The box has more cells. The message names tiles that lie far from the others, and
+            bounds that exclude them.
         """
         check_whole(self._tiles, most_cells, self.origin, self.resolution)
+
+    def box(self, bounds: npt.ArrayLike | None = None, *, most_cells: int = MOST_CELLS) -> CellBox:
+        """Return where the cells of a box lie.
+
+        Parameters
+        ----------
+        bounds : array_like, shape (2 d,), optional
+            Lower then upper corner [m, map], such as (xmin, ymin, xmax, ymax). The window
+            contains every cell that the box overlaps. Default: the bounding box of the observed
+            tiles.
+        most_cells : int, default 2**28
+            Largest number of cells in the box; each takes 8 bytes.
+
+        Raises
+        ------
+        InputError
+            The bounds are not finite, the upper corner is not above the lower, or the box has
+            more than `most_cells` cells. If this is due to tiles far from the others, the message
+            names them.
+        """
+        if bounds is None:
+            self.check_extent(most_cells)
+            lower, upper = self.cell_bounds()
+        else:
+            lower, upper = cells_of_box(bounds, self.origin, self.resolution)
+            check_size(lower, upper, most_cells, self.resolution)
+        corner = self.origin + lower[::-1] * self.resolution
+        return CellBox(lower, upper, corner, self.resolution)
+
+    def read(self, box: CellBox) -> GridWindow:
+        """Return the cells of a box as dense arrays; each takes 8 bytes."""
+        dense = self._tiles.read(box.lower, box.upper)
+        self._layers.raise_confidence(dense.confidence, box.lower, box.upper)
+        return GridWindow(dense.confidence, dense.count, box.origin, self.resolution)
 
     def window(
         self, bounds: npt.ArrayLike | None = None, *, most_cells: int = MOST_CELLS
@@ -198,36 +212,20 @@ class ConfidenceGrid:
         Parameters
         ----------
         bounds : array_like, shape (2 d,), optional
-            Lower then upper corner [m, map], such as (xmin, ymin, xmax, ymax); every cell that
-            the box touches is in. Default: the box around all touched tiles.
+            As for `box`.
         most_cells : int, default 2**28
             Cells that the box may hold; each takes 8 bytes.
 
         Raises
         ------
         InputError
-            Bounds that are not finite, whose upper corner is not above the lower, or that hold
-            more than `most_cells` cells. Where far tiles make the box around all tiles that
-            large, they are named.
+            As for `box`.
         """
-        if bounds is None:
-            self.check_extent(most_cells)
-            lower, upper = self.cell_bounds()
-        else:
-            lower, upper = cells_of_box(bounds, self.origin, self.resolution)
-            check_size(lower, upper, most_cells, self.resolution)
-        dense = self._tiles.read(lower, upper)
-        self._layers.raise_confidence(dense.confidence, lower, upper)
-        return GridWindow(
-            dense.confidence,
-            dense.count,
-            origin=self.origin + lower[::-1] * self.resolution,
-            resolution=self.resolution,
-        )
+        return self.read(self.box(bounds, most_cells=most_cells))
 
     def area(self, state: CellState) -> float:
-        """Return the area in that state [m²] (volume [m³] in 3-D)."""
-        # Tile by tile: a dense window would take the memory of the bounding box.
+        """Return the area of all cells in a state [m²]; on 3-D maps the volume [m³]."""
+        # Tile by tile, as a dense window may be much larger than the tiles.
         cells = 0
         for index, tile in self.tiles():
             confidence = tile.confidence.copy()
@@ -237,30 +235,28 @@ class ConfidenceGrid:
         return cells * self.resolution**self.ndim
 
     def fuse(self, lower: Ints, z: Floats32, height: Floats32 | None = None) -> None:
-        """Add what one view says (paper, section 5.2, equation 1, with the default rule).
+        """Add the evidence of one view (default rule: paper, section 5.2, equation 1).
 
         Parameters
         ----------
         lower : ndarray, shape (d,)
             Cell of the block's first entry, ``[row, col]``.
         z : ndarray of float32
-            Evidence per cell in [-1, 1]; 0 says nothing and changes nothing.
+            Evidence per cell in [-1, 1]; cells with 0 do not change.
         height : ndarray of float32, optional [m]
-            Where z < 0 the height of the lowest line of sight over the cell, where z > 0 the top
-            of what was seen in it (below 0 for a drop-off, infinite where it is not known). Free
-            evidence never outvotes a top that all lines of sight passed above, if more than one
-            view saw it. Without heights, evidence of any kind outvotes any other.
+            Where z < 0, the height of the lowest line of sight over the cell; where z > 0, the
+            top of the object in the cell: below 0 for a drop-off, infinite if unknown. Free
+            evidence of lines of sight above an object never cancels this object if more than one
+            view observed it. Without heights, free and non-free evidence cancel each other.
 
         Raises
         ------
         InputError
-            Evidence that is NaN or beyond [-1, 1], or a cell too far off to count; heights that
-            are NaN or of another shape.
+            Evidence is NaN or outside [-1, 1], a cell is out of range, or heights are NaN or of
+            another shape.
         """
         lower = as_cell("lower", lower, self.ndim)
-        z = self._as_evidence(z)
-        if not (np.abs(z) <= 1.0).all():
-            raise InputError("z", "evidence in [-1, 1]", "NaN or numbers beyond")
+        z = as_evidence(z, self.ndim)
         if height is not None:
             height = as_heights(height, np.shape(z))
         for tile, block in self._tiles.cut(lower, z):
@@ -268,23 +264,14 @@ class ConfidenceGrid:
         if height is not None:
             self._layers.fuse(lower, z, height, self.rule)
 
-    def _as_evidence(self, z: npt.ArrayLike) -> npt.NDArray[Any]:
-        expected = f"evidence in {self.ndim} dimensions"
-        try:
-            block = np.asarray(z)
-        except ValueError as error:  # rows of several lengths
-            raise InputError("z", expected, format_value(z)) from error
-        if block.ndim != self.ndim or block.dtype.kind not in "biuf":
-            raise InputError("z", expected, f"{block.dtype} of shape {block.shape}")
-        return block
-
     def merge(self, other: ConfidenceGrid) -> ConfidenceGrid:
-        """Return a new grid that holds what both saw, as if one mapper had seen all views.
+        """Return a new grid with the views of both, equal to a map of all views.
 
         Raises
         ------
         MergeError
-            Other resolution, origin or frame; another rule, or one without an associative merge.
+            Resolution, origin, frame, heights or rule differ, or the rule depends on the order of
+            the views.
 
         Examples
         --------
@@ -294,7 +281,7 @@ class ConfidenceGrid:
         >>> a.merge(b).confidence_at((0.5, 0.5))
         -0.25
         """
-        self._check_merge(other)
+        check_merge(self._settings(), other._settings())
         merged = self.copy()
         for index, theirs in other.tiles():
             ours = merged.tile(index)
@@ -303,58 +290,26 @@ class ConfidenceGrid:
         merged.trajectory = np.concatenate([self.trajectory, other.trajectory])
         return merged
 
-    def _check_merge(self, other: ConfidenceGrid) -> None:
-        for name in ("resolution", "frame", "rule", "origin", "heights"):
-            ours, theirs = getattr(self, name), getattr(other, name)
-            if not np.array_equal(ours, theirs):
-                raise MergeError(f"maps add up only with one {name}: expected {ours}, got {theirs}")
-        if not self.rule.mergeable:
-            raise MergeError(
-                f"the rule {self.rule.name!r} depends on the order of the views, so its maps "
-                "don't add up. Map with fusion='average', or integrate all views in one mapper."
-            )
-
     def copy(self) -> ConfidenceGrid:
-        """Return a grid of its own with the same content."""
-        twin = ConfidenceGrid(
-            resolution=self.resolution,
-            origin=self.origin.tolist(),
-            frame=self.frame,
-            rule=self.rule,
-            heights=self.heights,
-        )
+        """Return an independent copy of the grid."""
+        twin = ConfidenceGrid(**self._settings())
+        twin._tiles.copy_from(self._tiles)
         twin._layers.copy_from(self._layers)
-        for index, tile in self.tiles():
-            mine = twin.tile(index)
-            for layer in LAYERS:
-                getattr(mine, layer)[...] = getattr(tile, layer)
         twin.trajectory = self.trajectory.copy()
         return twin
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the grid to one file, without loss; an older file is replaced only at the end.
+        """Write the grid to a file without loss; an existing file is replaced at the end.
 
         Raises
         ------
         OSError
-            The folder does not exist or can't be written to.
+            The folder does not exist or is not writable.
         """
-        header = {
-            "format": FORMAT,
-            "version": VERSION,
-            "resolution": self.resolution,
-            "origin": self.origin.tolist(),
-            "frame": self.frame,
-            "rule": self.rule.to_dict(),
-            "heights": self.heights,
-        }
-        arrays = {
-            **self._tiles.to_arrays(),
-            **self._layers.to_arrays(),
-            "trajectory": self.trajectory,
-            "recent": self.recent.cells,
-        }
-        write_archive(path, header, arrays)
+        content = GridContent(
+            self._settings(), self._tiles, self._layers, self.trajectory, self.recent.cells
+        )
+        write_grid(path, content)
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> ConfidenceGrid:
@@ -363,23 +318,21 @@ class ConfidenceGrid:
         Raises
         ------
         FileFormatError
-            Not such a file, of a newer version, truncated or tampered with.
+            The file is not a map file, of a newer version, truncated or altered.
         """
-        header, arrays = read_archive(path, FORMAT, VERSION)
-        try:
-            header, arrays = upgrade(header, arrays)
-            grid = cls(
-                resolution=header["resolution"],
-                origin=header["origin"],
-                frame=header["frame"],
-                rule=rule_from(header["rule"]),
-                heights=tuple(header["heights"]),
-            )
-            grid._tiles = Tiles.from_arrays(grid.ndim, arrays)
-            grid._layers = HeightLayers.from_arrays(grid.ndim, grid.heights, arrays)
-            grid.trajectory = as_floats("trajectory", arrays["trajectory"], (None, 3))
-            check_finite("trajectory", grid.trajectory)
-            grid._saved_recent = as_cells("recent", arrays["recent"], grid.ndim)
-        except (KeyError, TypeError, ValueError) as error:
-            raise FileFormatError(path, "a complete map file", f"{error}") from error
+        content = read_grid(path)
+        grid = cls(**content.settings)
+        grid._tiles, grid._layers = content.tiles, content.layers
+        grid.trajectory = content.trajectory
+        grid._saved_recent = content.recent
         return grid
+
+    def _settings(self) -> dict[str, Any]:
+        """Return the arguments of the constructor."""
+        return {
+            "resolution": self.resolution,
+            "origin": self.origin.copy(),
+            "frame": self.frame,
+            "rule": self.rule,
+            "heights": self.heights,
+        }

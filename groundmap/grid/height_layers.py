@@ -1,8 +1,9 @@
-"""Evidence by height: what a line of sight can refute, and what it passes over.
+"""Evidence by height.
 
-A line of sight says something only about what would have stood in its way. Each layer has a height,
-and holds the evidence of things lower than the next layer's height against sight lower than its
-own: sight that passes above a thing never gets into the layer that the thing is in.
+A line of sight is evidence against obstacles that would block it, not against lower ones. Each
+layer has a height. It holds free evidence of lines of sight below this height, and non-free
+evidence of objects lower than the next layer's height. A line of sight that passes above an object
+is thus never in the layer of that object.
 """
 
 from __future__ import annotations
@@ -19,27 +20,27 @@ from groundmap.grid.fusion import UpdateRule
 from groundmap.grid.kernels.fuse import keep_low
 from groundmap.grid.tiles import LAYERS, Index, Tile, Tiles
 
-ONE_VIEW = 1.05  # sum of evidence: what a single view saw may be a false match
+ONE_VIEW = 1.05  # sum of evidence; a single view may be a false match
 SIGHT_HEIGHTS = (0.05, 0.15, 0.6)  # [m]
-NO_TOP = float("inf")  # [m], height of non-free evidence whose top was not seen
+NO_TOP = float("inf")  # [m], height of non-free evidence with an unobserved top
 
 
 class HeightLayers:
-    """Confidence and count per cell and height, in tiles that exist where heights are known.
+    """Confidence and update count per cell and height layer, in tiles.
 
     Parameters
     ----------
     ndim : int
         Dimension of the grid.
     heights : tuple of float [m]
-        Ascending. Free evidence is in a layer if sight passed below the layer's height, non-free
-        evidence if the top of what was seen is below the next layer's height; the last layer
-        holds all tops.
+        Ascending heights of the layers. A layer holds free evidence of lines of sight below its
+        height, and non-free evidence of objects whose top is below the next layer's height; the
+        last layer holds non-free evidence of any height.
 
     Raises
     ------
     InputError
-        Heights that are not above 0 and ascending.
+        The heights are not above 0 and ascending.
     """
 
     def __init__(self, ndim: int, heights: tuple[float, ...] = SIGHT_HEIGHTS) -> None:
@@ -51,15 +52,22 @@ class HeightLayers:
 
     @property
     def nbytes(self) -> int:
-        """Memory held by the tiles [bytes]."""
+        """Memory of the tiles [bytes]."""
         return sum(tiles.nbytes for tiles in self._layers)
 
     def fuse(self, lower: Ints, z: Floats32, height: Floats32, rule: UpdateRule) -> None:
-        """Add what one view says, with the height of each cell's evidence [m].
+        """Add the evidence of one view.
 
-        The height of free evidence is that of the lowest line of sight over the cell, that of
-        non-free evidence the top of what was seen there, below 0 for a drop-off, `NO_TOP` where
-        no top was seen.
+        Parameters
+        ----------
+        lower : ndarray of int, shape (d,)
+            Cell of the block's first entry, ``[row, col]``.
+        z : ndarray of float32
+            Evidence per cell in [-1, 1].
+        height : ndarray of float32, of z's shape [m]
+            Height of the lowest line of sight over the cell where z < 0; top of the object in the
+            cell where z > 0: below 0 for a drop-off, `NO_TOP` if no top was observed.
+        rule : UpdateRule
         """
         tops = (*self.heights[1:], NO_TOP)
         for tiles, sight, top in zip(self._layers, self.heights, tops, strict=True):
@@ -69,47 +77,71 @@ class HeightLayers:
                 rule.update(tile.confidence, tile.count, block)
 
     def raise_confidence(self, confidence: Floats32, lower: Ints, upper: Ints) -> None:
-        """Raise the confidence of a box of cells to that of the surest layer, in place.
+        """Raise the confidence of a box of cells to the highest of all layers, in place.
 
-        A layer says something only where its evidence adds up to more than one view's.
+        A layer counts only where the sum of its evidence exceeds that of one view.
+
+        Parameters
+        ----------
+        confidence : ndarray of float32
+            Confidence of the cells of the box, raised in place.
+        lower, upper : ndarray of int, shape (d,)
+            First cell of the box and the cell past its last.
         """
         for tiles in self._layers:
             dense = tiles.read(lower, upper)
             _raise(confidence, dense.confidence, dense.count)
 
     def raise_tile(self, confidence: Floats32, index: Index) -> None:
-        """Do the same for the cells of one tile."""
+        """Raise the confidence of the cells of a tile in place, as `raise_confidence`.
+
+        Parameters
+        ----------
+        confidence : ndarray of float32, of the tile shape
+        index : tuple of int
+        """
         for tiles in self._layers:
             tile = tiles.get(index)
             if tile is not None:
                 _raise(confidence, tile.confidence, tile.count)
 
     def raise_at(self, confidence: Floats32, cells: Ints) -> None:
-        """Do the same for single cells, shape (n, d)."""
+        """Raise the confidence of single cells in place, as `raise_confidence`.
+
+        Parameters
+        ----------
+        confidence : ndarray of float32, shape (n,)
+        cells : ndarray of int, shape (n, d)
+        """
         for tiles in self._layers:
             low, count = tiles.values_at(cells, "confidence"), tiles.values_at(cells, "count")
             _raise(confidence, low, count)
 
     def merge(self, other: HeightLayers, rule: UpdateRule) -> None:
-        """Add another map's layers in place."""
+        """Add the layers of another map in place.
+
+        Parameters
+        ----------
+        other : HeightLayers
+            Layers of the same heights.
+        rule : UpdateRule
+        """
         for ours, theirs in zip(self._layers, other._layers, strict=True):
             for index, tile in theirs.items():
                 mine = ours.touch(index)
                 rule.merge(mine.confidence, mine.count, tile.confidence, tile.count)
 
     def copy_from(self, other: HeightLayers) -> None:
-        """Take over the content of layers of the same heights."""
+        """Copy the content of layers of the same heights."""
         for ours, theirs in zip(self._layers, other._layers, strict=True):
-            for index, tile in theirs.items():
-                mine = ours.touch(index)
-                mine.confidence[...], mine.count[...] = tile.confidence, tile.count
+            ours.copy_from(theirs)
 
     def tiles(self, layer: int) -> Iterator[tuple[Index, Tile]]:
-        """Iterate over (index, tile) of one layer, counted from the lowest, by index."""
+        """Iterate over (index, tile) of a layer, 0 for the lowest, in the order of the indices."""
         return self._layers[layer].items()
 
     def to_arrays(self) -> dict[str, npt.NDArray[Any]]:
-        """Return all tiles stacked, as `Tiles.to_arrays`, each name with the layer's number."""
+        """Return the arrays of `Tiles.to_arrays` of all layers, the layer appended to the name."""
         return {
             f"{name}_{number}": array
             for number, tiles in enumerate(self._layers)
@@ -120,12 +152,19 @@ class HeightLayers:
     def from_arrays(
         cls, ndim: int, heights: tuple[float, ...], arrays: Mapping[str, npt.NDArray[Any]]
     ) -> HeightLayers:
-        """Return the layers that `to_arrays` stacked.
+        """Return the layers of the arrays that `to_arrays` returned.
+
+        Parameters
+        ----------
+        ndim : int
+            Dimension of the grid.
+        heights : tuple of float [m]
+        arrays : mapping of str to ndarray
 
         Raises
         ------
         InputError
-            Heights or arrays that are none.
+            Heights or arrays are invalid.
         KeyError
             A layer is missing.
         """
@@ -140,12 +179,18 @@ class HeightLayers:
 
 
 def as_heights(height: npt.ArrayLike, shape: tuple[int, ...]) -> Floats32:
-    """Return heights of evidence as an array, none of them NaN.
+    """Return the heights of evidence as an array without NaN.
+
+    Parameters
+    ----------
+    height : array_like [m]
+    shape : tuple of int
+        Expected shape.
 
     Raises
     ------
     InputError
-        No numbers, NaN, or another shape.
+        The array has another shape, is not numeric or contains NaN.
     """
     array = np.asarray(height)
     if array.shape != shape or array.dtype.kind not in "iuf" or np.isnan(array).any():
@@ -157,5 +202,5 @@ def as_heights(height: npt.ArrayLike, shape: tuple[int, ...]) -> Floats32:
 
 
 def _raise(confidence: Floats32, low: Floats32, count: Counts) -> None:
-    """Raise confidence, in place, where a layer's evidence is that of more than one view."""
+    """Raise confidence in place where a layer's evidence exceeds that of one view."""
     np.maximum(confidence, low, out=confidence, where=low * count > ONE_VIEW)

@@ -1,4 +1,4 @@
-"""Grid files of older versions, in terms of the newest."""
+"""Conversion of grid files of older versions to the newest."""
 
 from __future__ import annotations
 
@@ -11,22 +11,27 @@ from groundmap.errors import InputError
 from groundmap.grid.height_layers import SIGHT_HEIGHTS
 from groundmap.grid.tiles import TILE_SHAPES
 
-DROP_OFF_VIEWS = 3  # a drop-off that so many views saw was non-free, whatever the average
+DROP_OFF_VIEWS = 3  # views of a drop-off from which version 1 set its cell to non-free
 
 Header: TypeAlias = dict[str, Any]
 Arrays: TypeAlias = dict[str, npt.NDArray[Any]]
 
 
 def upgrade(header: Header, arrays: Arrays) -> tuple[Header, Arrays]:
-    """Return header and arrays as the newest version has them.
+    """Return header and arrays in the format of the newest version.
 
-    Version 1 counted the views that saw a drop-off in each cell; these become evidence of the
-    lowest layer where there were enough of them, so that the cells' states stay the same.
+    Version 1 has, per cell, the number of views of a drop-off. Where a drop-off made the cell
+    non-free, it becomes evidence of the lowest layer, which preserves the state of the cell.
+
+    Parameters
+    ----------
+    header : dict
+    arrays : dict of str to ndarray
 
     Raises
     ------
     InputError
-        Counts of another type or shape.
+        The counts have another type or shape.
     KeyError
         A part of the file is missing.
     """

@@ -1,4 +1,4 @@
-"""Tiles: small dense arrays that exist where something was seen, in any direction."""
+"""Sparse storage of cells: dense tiles, allocated on first use."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Index = tuple[int, ...]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tile:
-    """One tile's arrays, each of the tile shape; the fields are `LAYERS`."""
+    """Arrays of a tile, each of the tile shape; the fields are `LAYERS`."""
 
     confidence: Floats32
     count: Counts
@@ -34,6 +34,7 @@ class Tiles:
     Parameters
     ----------
     ndim : int
+        2 or 3.
 
     Examples
     --------
@@ -53,12 +54,12 @@ class Tiles:
 
     @property
     def nbytes(self) -> int:
-        """Memory held [bytes]."""
+        """Memory of all tiles [bytes]."""
         cells = int(np.prod(self.shape))
         return len(self) * cells * sum(np.dtype(kind).itemsize for kind in LAYERS.values())
 
     def touch(self, index: Index) -> Tile:
-        """Return the tile of that index, allocated if it was not there."""
+        """Return the tile of an index; it is allocated if it does not exist."""
         if index not in self._held:
             self._held[index] = Tile(
                 **{name: np.zeros(self.shape, dtype=kind) for name, kind in LAYERS.items()}
@@ -66,7 +67,7 @@ class Tiles:
         return self._held[index]
 
     def get(self, index: Index) -> Tile | None:
-        """Return the tile of that index, if there is one."""
+        """Return the tile of an index, or None if it does not exist."""
         return self._held.get(index)
 
     def items(self) -> Iterator[tuple[Index, Tile]]:
@@ -75,7 +76,7 @@ class Tiles:
             yield index, self._held[index]
 
     def cell_bounds(self) -> tuple[Ints, Ints]:
-        """Return the first cell of the tiles and the cell past the last; zeros without tiles."""
+        """Return the first cell of all tiles and the cell past the last; zeros without tiles."""
         indices = np.array(list(self._held), dtype=np.int64).reshape(-1, len(self.shape))
         if len(indices) == 0:
             nowhere = np.zeros(len(self.shape), dtype=np.int64)
@@ -83,9 +84,15 @@ class Tiles:
         return indices.min(axis=0) * self.shape, (indices.max(axis=0) + 1) * self.shape
 
     def cut(self, lower: Ints, block: Floats32) -> Iterator[tuple[Tile, Floats32]]:
-        """Cut a block of cells along the tiles: yield each tile with its part, zeros around it.
+        """Split a block of cells by tile: yield each tile and its part, padded with zeros.
 
-        Parts that are all zero touch no tile.
+        Parts without values other than zero are skipped, and their tiles are not allocated.
+
+        Parameters
+        ----------
+        lower : ndarray of int, shape (d,)
+            Cell of the block's first entry.
+        block : ndarray of float32
         """
         axes = map(_pieces, lower.tolist(), block.shape, self.shape)
         for pieces in itertools.product(*axes):
@@ -97,7 +104,13 @@ class Tiles:
                 yield self.touch(index), part
 
     def read(self, lower: Ints, upper: Ints) -> Tile:
-        """Return the cells from `lower` up to `upper` as dense arrays; zeros without tiles."""
+        """Return the cells of a box as dense arrays; zeros where no tile exists.
+
+        Parameters
+        ----------
+        lower, upper : ndarray of int, shape (d,)
+            First cell of the box and the cell past its last.
+        """
         shape = tuple((upper - lower).tolist())
         dense = Tile(**{name: np.zeros(shape, dtype=kind) for name, kind in LAYERS.items()})
         for index, tile in self._within(lower, upper):
@@ -107,7 +120,14 @@ class Tiles:
         return dense
 
     def values_at(self, cells: Ints, layer: str) -> npt.NDArray[Any]:
-        """Return a layer's values in cells, shape (n, d); 0 without a tile."""
+        """Return the values of cells, shape (n,); 0 where no tile exists.
+
+        Parameters
+        ----------
+        cells : ndarray of int, shape (n, d)
+        layer : str
+            A key of `LAYERS`.
+        """
         values = np.zeros(len(cells), dtype=LAYERS[layer])
         for rows, index in self._by_tile(cells):
             tile = self.get(index)
@@ -117,7 +137,7 @@ class Tiles:
         return values
 
     def _by_tile(self, cells: Ints) -> Iterator[tuple[Ints, Index]]:
-        """Yield the rows of the cells in each tile, and the tile's index."""
+        """Yield, for each tile, the rows of its cells and its index."""
         if len(cells) == 0:
             return
         indices = cells // self.shape
@@ -127,7 +147,7 @@ class Tiles:
             yield rows, tuple(indices[rows[0]].tolist())
 
     def _within(self, lower: Ints, upper: Ints) -> Iterator[tuple[Index, Tile]]:
-        """Yield the tiles that a box of cells touches: a small box's without a look at the rest."""
+        """Yield the tiles that a box of cells overlaps; for small boxes without a search of all."""
         if (upper <= lower).any():
             return
         first, last = lower // self.shape, (upper - 1) // self.shape
@@ -144,11 +164,11 @@ class Tiles:
                 yield index, tile
 
     def main_part(self, most_cells: int) -> tuple[Ints, Ints]:
-        """Return indices of the tiles that stay, and of those that were taken away, (n, d) each.
+        """Return the indices of the main part of the tiles and of the others, (n, d) each.
 
-        As long as the box around them holds more than `most_cells`, the tiles are parted at the
-        widest gap along an axis, and the fewer of them are taken away; where there is no gap, the
-        box stays too large.
+        While the bounding box of the main part has more than `most_cells` cells, it is split at
+        its widest gap along an axis, and the smaller part is removed. If there is no gap, the box
+        stays too large.
         """
         kept = np.array(sorted(self._held), dtype=np.int64).reshape(-1, len(self.shape))
         away = [kept[:0]]
@@ -161,8 +181,14 @@ class Tiles:
             kept = kept[~fewer]
         return kept, np.concatenate(away)
 
+    def copy_from(self, other: Tiles) -> None:
+        """Copy the values of all tiles of another grid."""
+        for index, tile in other.items():
+            mine = self.touch(index)
+            mine.confidence[...], mine.count[...] = tile.confidence, tile.count
+
     def to_arrays(self) -> dict[str, npt.NDArray[Any]]:
-        """Return all tiles stacked, one array per layer, and their indices as ``tiles``."""
+        """Return one array per layer with all tiles stacked, and their indices as ``tiles``."""
         indices = np.array([index for index, _ in self.items()], dtype=np.int64)
         arrays: dict[str, npt.NDArray[Any]] = {"tiles": indices.reshape(-1, len(self.shape))}
         for name, kind in LAYERS.items():
@@ -172,13 +198,19 @@ class Tiles:
 
     @classmethod
     def from_arrays(cls, ndim: int, arrays: Mapping[str, npt.NDArray[Any]]) -> Tiles:
-        """Return the tiles that `to_arrays` stacked.
+        """Return the tiles of the arrays that `to_arrays` returned.
+
+        Parameters
+        ----------
+        ndim : int
+            Dimension of the grid.
+        arrays : mapping of str to ndarray
 
         Raises
         ------
         InputError
-            Another type or shape, a tile that comes twice or lies too far off, confidence beyond
-            [-1, 1].
+            An array has another type or shape, an index is duplicated or out of range, or a
+            confidence is outside [-1, 1].
         KeyError
             A layer is missing.
         """
@@ -201,7 +233,7 @@ class Tiles:
     def _overlap(
         self, index: Ints, lower: Ints, upper: Ints
     ) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
-        """Return where a tile and a box meet: slices of the tile, slices of the box."""
+        """Return the intersection of a tile and a box: slices of the tile, slices of the box."""
         corner = index * self.shape
         start = np.maximum(corner, lower)
         stop = np.maximum(start, np.minimum(corner + self.shape, upper))
@@ -229,7 +261,7 @@ def _pieces(lower: int, length: int, side: int) -> list[tuple[int, slice, slice]
 
 
 def _beyond_widest_gap(indices: Ints) -> Bools | None:
-    """Return which indices lie below the widest gap along an axis; None where there is no gap."""
+    """Return which indices lie below the widest gap along an axis; None if there is no gap."""
     widest, below = 1, None
     for along in indices.T:
         places = np.unique(along)

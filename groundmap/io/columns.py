@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -17,10 +18,13 @@ from groundmap.io.rows import record
 from groundmap.view.stereo_rig import StereoRig
 from groundmap.view.view import Features, WrongCovariance, wrong_covariance
 
+# From rows and their positions, shape (n, 3) or (n, 2, 3), to covariances.
+Noise = Callable[[npt.NDArray[Any], Floats], Floats]
 Kind = Literal["points", "segments"]
 KINDS: tuple[Kind, ...] = ("points", "segments")
 
 PIXEL_FIELDS = ("uL", "uR", "v")
+PLACE_FIELDS = ("x", "y", "z")
 XYZ_FIELDS = ("x", "y", "z", "cxx", "cxy", "cxz", "cyy", "cyz", "czz")
 # Indices of the six numbers of a covariance in its 3 x 3 matrix, and the reverse.
 SYMMETRIC = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
@@ -35,7 +39,7 @@ class Layout:
     Parameters
     ----------
     fields : tuple of str
-        `PIXEL_FIELDS` [px], or `XYZ_FIELDS` [m and m², camera].
+        `PIXEL_FIELDS` [px], `PLACE_FIELDS` [m, camera] or `XYZ_FIELDS` [m and m², camera].
     ends : int
         1 for points, 2 for segments.
 
@@ -59,7 +63,9 @@ class Layout:
         """Type of a row."""
         return record(["view", "id"], self.ends * len(self.fields))
 
-    def features(self, rows: npt.NDArray[Any], rig: StereoRig) -> tuple[Features, Counter[str]]:
+    def features(
+        self, rows: npt.NDArray[Any], rig: StereoRig, noise: Noise
+    ) -> tuple[Features, Counter[str]]:
         """Return the features of rows, and the number of rows without a 3-D point, by reason.
 
         Parameters
@@ -67,21 +73,30 @@ class Layout:
         rows : ndarray, shape (n,)
             Of type `row`.
         rig : StereoRig
+        noise : callable
+            From rows and their positions to covariances, for columns without.
         """
-        shape = (
-            (len(rows), len(self.fields)) if self.ends == 1 else (len(rows), 2, len(self.fields))
-        )
-        values, ids = rows["values"].reshape(shape), rows["id"]
+        values, ids = self._values(rows), rows["id"]
         if self.fields == PIXEL_FIELDS:
             xyz, covariance, kept, dropped = rig.triangulate(values)
             return Features(xyz, covariance, ids[kept]), dropped
         # Copies, so that a view does not keep its table in memory.
-        xyz, covariance = values[..., :3].copy(), _covariance(values)
+        xyz = self.positions(rows)
+        covariance = noise(rows, xyz) if self.fields == PLACE_FIELDS else _covariance(values)
         return Features(xyz, covariance, ids.copy()), Counter()
+
+    def positions(self, rows: npt.NDArray[Any]) -> Floats:
+        """Return the positions of rows in XYZ form, shape (n, 3) or (n, 2, 3) [m, camera]."""
+        return self._values(rows)[..., :3].copy()
+
+    def _values(self, rows: npt.NDArray[Any]) -> Floats:
+        ends = () if self.ends == 1 else (2,)
+        values: Floats = rows["values"].reshape(len(rows), *ends, len(self.fields))
+        return values
 
     def wrong_covariance(self, rows: npt.NDArray[Any]) -> WrongCovariance | None:
         """Return the first row with an invalid covariance, or None."""
-        if self.fields == PIXEL_FIELDS:
+        if self.fields != XYZ_FIELDS:
             return None
         values = rows["values"].reshape(len(rows), self.ends, len(self.fields))
         return wrong_covariance(_covariance(values))
@@ -92,9 +107,10 @@ def _covariance(values: Floats) -> Floats:
     return covariance
 
 
-LAYOUTS: dict[Kind, tuple[Layout, Layout]] = {
-    "points": (Layout(PIXEL_FIELDS, 1), Layout(XYZ_FIELDS, 1)),
-    "segments": (Layout(PIXEL_FIELDS, 2), Layout(XYZ_FIELDS, 2)),
+FORMS = (PIXEL_FIELDS, XYZ_FIELDS, PLACE_FIELDS)
+LAYOUTS: dict[Kind, tuple[Layout, ...]] = {
+    "points": tuple(Layout(fields, 1) for fields in FORMS),
+    "segments": tuple(Layout(fields, 2) for fields in FORMS),
 }
 
 

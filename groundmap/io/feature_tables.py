@@ -14,7 +14,7 @@ import numpy.typing as npt
 from groundmap.arrays import as_floats
 from groundmap.errors import FileFormatError, InputError
 from groundmap.files.array_files import read_arrays
-from groundmap.io.columns import KINDS, LARGEST_ID, LAYOUTS, Kind, Layout, find_layout
+from groundmap.io.columns import KINDS, LARGEST_ID, LAYOUTS, Kind, Layout, Noise, find_layout
 from groundmap.io.rows import open_rows, read_rows
 from groundmap.io.view_order import first_wrong, split_by_view
 from groundmap.view.stereo_rig import StereoRig
@@ -35,11 +35,16 @@ class FeatureTable(ABC):
 
     layout: Layout
 
+    @property
+    @abstractmethod
+    def is_empty(self) -> bool:
+        """Whether there is no table at all."""
+
     @abstractmethod
     def chunks(self, views: int) -> Iterable[npt.NDArray[Any]]:
         """Iterate over the rows; their views are checked to ascend, and to be below `views`."""
 
-    def by_view(self, views: int, rig: StereoRig) -> Iterator[ViewFeatures]:
+    def by_view(self, views: int, rig: StereoRig, noise: Noise) -> Iterator[ViewFeatures]:
         """Iterate over the views, including those without rows.
 
         Parameters
@@ -47,9 +52,11 @@ class FeatureTable(ABC):
         views : int
             Number of views.
         rig : StereoRig
+        noise : callable
+            See `Layout.features`.
         """
         for rows in split_by_view(self.chunks(views), views, self.layout.row):
-            yield ViewFeatures(*self.layout.features(rows, rig))
+            yield ViewFeatures(*self.layout.features(rows, rig, noise))
 
 
 class CsvTable(FeatureTable):
@@ -63,6 +70,11 @@ class CsvTable(FeatureTable):
                 header = stream.readline().strip()
             names = tuple(name.strip() for name in header.split(",")) if header else ()
             self.layout = find_layout(path, kind, names)
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether the file is missing."""
+        return not self.exists
 
     def chunks(self, views: int) -> Iterator[npt.NDArray[Any]]:
         """Iterate over the rows, a chunk of lines at a time."""
@@ -92,6 +104,11 @@ class ArrayTable(FeatureTable):
 
     def __init__(self, path: Path, layout: Layout, rows: npt.NDArray[Any]) -> None:
         self.path, self.layout, self.rows = path, layout, rows
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there are no rows."""
+        return not len(self.rows)
 
     def chunks(self, views: int) -> Iterator[npt.NDArray[Any]]:
         """Yield all rows as one chunk."""

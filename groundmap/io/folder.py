@@ -3,12 +3,15 @@
 ``rig.toml``
     ``world = "optical"`` (x right, y down, z forward) or ``"rep103"`` (z up), ``fx``, ``fy``,
     ``cx``, ``cy`` [px], ``baseline`` [m]; optional ``pixel_noise_px`` and ``T_base_camera``, the
-    camera in ``base_link`` as four lists of four numbers (default: the identity).
+    camera in ``base_link`` as four lists of four numbers (default: the identity). Without features
+    in pixels, ``world`` is enough: the borders of the image are then those of the features.
 ``poses.txt``
     One row per view, the pose of ``base_link`` in the world: ``timestamp tx ty tz qx qy qz qw``.
 ``points.csv``
     With the header ``view,id,uL,uR,v``, or ``view,id,x,y,z,cxx,cxy,cxz,cyy,cyz,czz`` (camera
-    frame). ``view`` is the zero-based row of ``poses.txt``, ascending; id -1 means no id.
+    frame), or ``view,id,x,y,z``, with the covariance that the rig gives, or the bearings of the
+    views that saw a landmark. ``view`` is the zero-based row of ``poses.txt``, ascending; id -1
+    means no id.
 ``segments.csv``
     The same with both ends: ``view,id,uL0,uR0,v0,uL1,uR1,v1``, or ``view,id,x0,...,czz0,x1,...``.
     Either of the two tables may be missing.
@@ -30,6 +33,7 @@ from groundmap.io.columns import KINDS, Kind
 from groundmap.io.feature_tables import CsvTable, FeatureTable, read_npz
 from groundmap.io.log import ViewLog
 from groundmap.io.poses import poses_by_time, read_tum
+from groundmap.io.positions import rig_and_noise
 from groundmap.io.rig import read_rig
 from groundmap.view.frames import map_from_world
 from groundmap.view.view import View
@@ -53,17 +57,24 @@ class FolderLog(ViewLog):
     looks_for = f"{RIG}, or one of {', '.join(TABLES.values())} and {ARCHIVE}"
 
     def __init__(self, path: Path, *, poses: Path | None = None) -> None:
+        path = path.parent if path.is_file() else path
         super().__init__(path, poses=poses)
-        self.rig, world = read_rig(path / RIG)
+        given = read_rig(path / RIG)
         own = read_tum(path / POSES)
         T_world_base = own.transforms if poses is None else poses_by_time(poses, own.keys)
         self._timestamps = own.keys.tolist()
-        self._T_map_base = map_from_world(T_world_base, world)
+        self._T_map_base = map_from_world(T_world_base, given.world)
         self._tables = _find_tables(path)
+        T_map_camera = self._T_map_base @ given.T_base_camera
+        self.rig, self._noise = rig_and_noise(path / RIG, given, self._tables, T_map_camera)
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
         """Return whether a rig or a table of features exists; other formats have poses, too."""
+        if path.is_file():
+            return path.name in {RIG, POSES, ARCHIVE, *TABLES.values()} and cls.recognises(
+                path.parent
+            )
         return any((path / name).is_file() for name in (RIG, ARCHIVE, *TABLES.values()))
 
     def __len__(self) -> int:
@@ -72,7 +83,7 @@ class FolderLog(ViewLog):
 
     def __iter__(self) -> Iterator[View]:
         """Iterate over the views in the order of the poses."""
-        tables = (self._tables[kind].by_view(len(self), self.rig) for kind in KINDS)
+        tables = (self._tables[kind].by_view(len(self), self.rig, self._noise) for kind in KINDS)
         poses = zip(self._T_map_base, self._timestamps, strict=True)
         for (T_map_base, timestamp), points, segments in zip(poses, *tables, strict=True):
             yield View(

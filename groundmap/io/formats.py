@@ -11,8 +11,41 @@ from groundmap.files.opening import check_name
 from groundmap.io.folder import FolderLog
 from groundmap.io.gtsam import GtsamLog
 from groundmap.io.log import ViewLog
+from groundmap.io.readers.bal import BalLog
+from groundmap.io.readers.base import SparseMapLog
+from groundmap.io.readers.bundler import BundlerLog
+from groundmap.io.readers.colmap import ColmapLog
+from groundmap.io.readers.meshroom import MeshroomLog
+from groundmap.io.readers.nvm import NvmLog
+from groundmap.io.readers.openmvg import OpenMvgLog
+from groundmap.io.readers.openmvs import OpenMvsLog
+from groundmap.io.readers.opensfm import OpenSfmLog
+from groundmap.io.readers.orbslam import OrbSlamLog
+from groundmap.io.readers.points import PointsLog
+from groundmap.io.readers.refused import refusal_of
+from groundmap.io.readers.rosbag import RosbagLog
+from groundmap.io.readers.rtabmap import RtabmapLog
+from groundmap.io.readers.stella import StellaLog
 
-FORMATS: dict[str, type[ViewLog]] = {"gtsam": GtsamLog, "folder": FolderLog}
+FORMATS: dict[str, type[ViewLog]] = {
+    "gtsam": GtsamLog,
+    "folder": FolderLog,
+    "bal": BalLog,
+    "bundler": BundlerLog,
+    "colmap": ColmapLog,
+    "meshroom": MeshroomLog,
+    "nvm": NvmLog,
+    "openmvg": OpenMvgLog,
+    "openmvs": OpenMvsLog,
+    "opensfm": OpenSfmLog,
+    "orbslam": OrbSlamLog,
+    "points": PointsLog,
+    "rosbag": RosbagLog,
+    "rtabmap": RtabmapLog,
+    "stella": StellaLog,
+}
+
+SHOWN_NAMES = 5  # of the files of an unknown folder
 
 
 def read_views(
@@ -20,20 +53,26 @@ def read_views(
     *,
     format: str | None = None,
     poses: str | PathLike[str] | None = None,
+    point_noise: float | None = None,
+    guess_visibility: bool = False,
 ) -> ViewLog:
-    """Open a log of views.
+    """Open a log of views, or the sparse map of a SLAM or structure-from-motion system.
 
     Parameters
     ----------
     path : path
-        The folder that holds the log.
+        The folder or file that holds the log.
     format : str, optional
-        A key of `FORMATS`; default: recognised by the folder's files.
+        A key of `FORMATS`; default: recognised by the contents of the files.
     poses : path, optional
         A file whose poses replace the log's, in the same world: rows of ``timestamp tx ty tz
         qx qy qz qw``, or of an id and the 16 numbers of the transform. A GTSAM log finds them by
         id (timestamps are taken as ids); a folder uses them row by row, and their timestamps must
         be those of the log (ids are taken as indices of views).
+    point_noise : float, optional [unit of the log]
+        Standard deviation of the landmarks of a sparse map; default: that of their triangulation.
+    guess_visibility : bool, default False
+        Whether to guess which view saw which landmark, where the files do not contain it.
 
     Returns
     -------
@@ -45,7 +84,7 @@ def read_views(
     InputError
         An unknown format; the error lists the known ones, the nearest first.
     FileFormatError
-        Not a folder, a folder of no known format, or invalid files.
+        Nothing of that name, no known format, two formats, or invalid files.
 
     Examples
     --------
@@ -61,25 +100,51 @@ def read_views(
     ...     print(len(views), *(view.points.xyz for view in views))
     2 [[ 0.5  0.5 10. ]] [[ 0.5  0.5 10. ]]
     """
-    folder = Path(path)
+    source = Path(path)
     if format is not None and format not in FORMATS:
         raise InputError("format", f"one of {', '.join(_nearest_first(format))}", repr(format))
-    check_name(folder, "a folder of views")
-    if not folder.is_dir():
-        if folder.exists():
-            hint = "Give the folder that contains it."
-            raise FileFormatError(folder, "a folder of views", "a file", hint=hint)
-        raise FileFormatError(folder, "a folder of views", "nothing of that name")
-    log = FORMATS[format] if format is not None else _recognise(folder)
-    return log(folder, poses=None if poses is None else Path(poses))
+    check_name(source, "a log of views")
+    if not source.exists():
+        raise FileFormatError(source, "a folder or file of views", "nothing of that name")
+    log = FORMATS[format] if format is not None else _recognise(source)
+    replaced = None if poses is None else Path(poses)
+    if issubclass(log, SparseMapLog):
+        return log(
+            source, poses=replaced, point_noise=point_noise, guess_visibility=guess_visibility
+        )
+    if point_noise is not None or guess_visibility:
+        name = "point_noise" if point_noise is not None else "guess_visibility"
+        raise InputError(name, "a sparse map, which has landmarks", f"a log of {source}")
+    return log(source, poses=replaced)
 
 
-def _recognise(folder: Path) -> type[ViewLog]:
-    for log in FORMATS.values():
-        if log.recognises(folder):
-            return log
-    known = "; ".join(f"{name}: {log.looks_for}" for name, log in FORMATS.items())
-    raise FileFormatError(folder, f"the files of a known format ({known})", "none of them")
+def _recognise(source: Path) -> type[ViewLog]:
+    certain = _found(source, weak=False) or _found(source, weak=True)
+    if len(certain) > 1:
+        hint = f"Choose one: --format {certain[0]}, or --format {certain[1]}."
+        raise FileFormatError(source, "one log", f"files of {' and '.join(certain)}", hint=hint)
+    if certain:
+        return FORMATS[certain[0]]
+    refusal = refusal_of(source)
+    if refusal is not None:
+        raise refusal
+    formats = "; ".join(f"{name}: {log.looks_for}" for name, log in FORMATS.items())
+    raise FileFormatError(source, f"the files of a known format ({formats})", _contents(source))
+
+
+def _found(source: Path, *, weak: bool) -> list[str]:
+    return [name for name, log in FORMATS.items() if log.weak == weak and log.recognises(source)]
+
+
+def _contents(source: Path) -> str:
+    """Return what a source contains that no format has, for error messages."""
+    if source.is_file():
+        return "another file"
+    names = sorted(entry.name + "/" * entry.is_dir() for entry in source.iterdir())
+    if not names:
+        return "an empty folder"
+    more = f" and {len(names) - SHOWN_NAMES} more" if len(names) > SHOWN_NAMES else ""
+    return f"none of them, but {', '.join(names[:SHOWN_NAMES])}{more}"
 
 
 def _nearest_first(name: str) -> list[str]:

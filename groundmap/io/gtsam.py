@@ -7,13 +7,17 @@
     y down, z forward. Views are sorted by id; the rows may have any order.
 ``VO_stereo_factors.txt``
     ``pose_id landmark_id uL uR v X Y Z``, in any order.
+
+The sets that GTSAM publishes have a suffix in their names, such as ``VO_camera_poses00s.txt``. The
+files of a set have the same one; only the calibration may have none.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -34,6 +38,7 @@ CALIBRATION, POSES, FACTORS = (
     "VO_stereo_factors.txt",
 )
 CALIBRATION_ROW = record([], 6)
+FILES = re.compile(r"(VO_calibration|VO_camera_poses|VO_stereo_factors)(.*)\.txt")
 # X Y Z are read to check the row, and ignored: they are the same pixels triangulated with the same
 # rig, but without the covariance that the pixels give.
 FACTOR_ROW = record(["pose", "landmark"], 6)
@@ -57,21 +62,24 @@ class GtsamLog(ViewLog):
 
     def __init__(self, path: Path, *, poses: Path | None = None) -> None:
         super().__init__(path, poses=poses)
-        self.rig = _read_rig(path / CALIBRATION)
+        files = _find_files(path)
+        self.rig = _read_rig(files.calibration)
         #: Pose ids of the views, shape (n,), ascending.
-        self.ids, T_world_camera = _read_sorted_poses(path / POSES)
+        self.ids, T_world_camera = _read_sorted_poses(files.poses)
         if poses is not None:
             T_world_camera = poses_by_id(poses, self.ids)
         self._T_map_camera = map_from_world(T_world_camera, "optical")
-        factors = _read_factors(path / FACTORS, self.ids)
+        factors = _read_factors(files.factors, self.ids)
         self._factors = RowsByView(factors, len(self.ids), STORED_ROW)
         if not len(self._factors):
-            raise FileFormatError(path / FACTORS, "at least one factor", "an empty file")
+            raise FileFormatError(files.factors, "at least one factor", "an empty file")
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
         """Return whether any of the three files exists; opening reports the missing ones."""
-        return any((path / name).is_file() for name in (CALIBRATION, POSES, FACTORS))
+        if path.is_file():
+            return FILES.fullmatch(path.name) is not None
+        return bool(_suffixes(path))
 
     def __len__(self) -> int:
         """Return the number of poses."""
@@ -84,6 +92,43 @@ class GtsamLog(ViewLog):
             yield View.from_pixels(
                 T_map_camera, self.rig, points_px=rows["pixels"], point_ids=rows["id"]
             )
+
+
+class _Files(NamedTuple):
+    calibration: Path
+    poses: Path
+    factors: Path
+
+
+def _suffixes(folder: Path) -> dict[str, set[str]]:
+    """Return which of the three files a folder has, by the suffix of their names."""
+    found: dict[str, set[str]] = {}
+    for entry in sorted(folder.iterdir()):
+        match = FILES.fullmatch(entry.name)
+        if match:
+            found.setdefault(match[2], set()).add(match[1])
+    return found
+
+
+def _find_files(path: Path) -> _Files:
+    """Return the files of the only set in a folder, or of the set that a file belongs to."""
+    folder = path.parent if path.is_file() else path
+    match = FILES.fullmatch(path.name) if path.is_file() else None
+    suffixes = _suffixes(folder)
+    # A calibration alone is no set: several share one.
+    sets = [suffix for suffix, names in suffixes.items() if names != {"VO_calibration"}]
+    chosen = [match[2]] if match and match[2] in sets else sets
+    if len(chosen) > 1:
+        names = " and ".join(f"VO_stereo_factors{suffix}.txt" for suffix in chosen[:2])
+        hint = "Give the file with the factors of one."
+        raise FileFormatError(path, "the files of one set", f"{names}", hint=hint)
+    suffix = chosen[0] if chosen else ""
+    own = "VO_calibration" in suffixes.get(suffix, set())
+    return _Files(
+        folder / f"VO_calibration{suffix if own else ''}.txt",
+        folder / f"VO_camera_poses{suffix}.txt",
+        folder / f"VO_stereo_factors{suffix}.txt",
+    )
 
 
 def _read_rig(path: Path) -> StereoRig:

@@ -19,7 +19,7 @@ class ViewLog(ABC):
     Parameters
     ----------
     path : Path
-        The log's folder.
+        The log's folder, or a file of some formats.
     poses : Path, optional
         A file whose poses replace those of the log, in a form that `groundmap.io.poses` describes.
 
@@ -30,6 +30,7 @@ class ViewLog(ABC):
     """
 
     looks_for: ClassVar[str]  #: files that `recognises` looks for, for error messages
+    weak: ClassVar[bool] = False  #: whether any text files may look like this format
 
     def __init__(self, path: Path, *, poses: Path | None = None) -> None:
         self.path, self.poses_path = path, poses
@@ -37,7 +38,7 @@ class ViewLog(ABC):
     @classmethod
     @abstractmethod
     def recognises(cls, path: Path) -> bool:
-        """Return whether a folder looks like this format, by the names of its files."""
+        """Return whether a folder or file looks like this format."""
 
     @abstractmethod
     def __len__(self) -> int:

@@ -61,10 +61,13 @@ def grid_of(found: BlockedMap | BlockedVoxels, *, frame: str = "map") -> Confide
     ([1.0, -1.0, 0.0], [1, 1, 0])
     """
     grid = ConfidenceGrid(resolution=found.resolution, origin=found.origin, frame=frame)
-    z = np.where(found.blocked, np.float32(1.0), np.float32(-1.0))
-    if isinstance(found, BlockedMap):
-        z[found.unknown] = 0.0
-    grid.fuse(np.zeros(z.ndim, dtype=np.int64), z)
+    side = grid.tile_shape[0]
+    for first in range(0, len(found.blocked), side):  # one row or layer of tiles at a time
+        part = slice(first, first + side)
+        z = np.where(found.blocked[part], np.float32(1.0), np.float32(-1.0))
+        if isinstance(found, BlockedMap):
+            z[found.unknown[part]] = 0.0
+        grid.fuse(np.array([first] + [0] * (z.ndim - 1)), z)
     return grid
 
 

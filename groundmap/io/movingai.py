@@ -13,7 +13,7 @@ from groundmap.io.map_images import BlockedMap, BlockedVoxels
 from groundmap.io.rows import SHOWN_CHARACTERS, open_rows, read_rows, record
 
 PASSABLE, BLOCKED = ".GS", "@OTW"
-MOST_VOXELS = 2**26
+MOST_VOXELS = 2**27  # their map takes 1 GiB
 MOST_DIGITS = 9  # of the length of a side
 
 

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
 from pydantic import ConfigDict, Field
 
+from groundmap.arrays import Floats
 from groundmap.errors import FileFormatError, InputError
 from groundmap.files.documents import read_toml
 from groundmap.settings import Settings
-from groundmap.view.frames import WorldConvention
+from groundmap.view.frames import WorldConvention, check_transform
 from groundmap.view.stereo_rig import StereoRig
+
+IMAGE_KEYS = ("fx", "fy", "cx", "cy", "baseline")  # all of them, or none
 
 
 class RigFile(Settings):
@@ -20,11 +24,13 @@ class RigFile(Settings):
     model_config = ConfigDict(strict=True)  # text and truth values are not numbers
 
     world: WorldConvention = Field(description="axes of the world frame of the poses")
-    fx: float = Field(description="focal length [px]")
-    fy: float = Field(description="focal length [px]")
-    cx: float = Field(description="column of the principal point of the left image [px]")
-    cy: float = Field(description="row of the principal point [px]")
-    baseline: float = Field(description="distance between the cameras [m]")
+    fx: float | None = Field(None, description="focal length [px]")
+    fy: float | None = Field(None, description="focal length [px]")
+    cx: float | None = Field(
+        None, description="column of the principal point of the left image [px]"
+    )
+    cy: float | None = Field(None, description="row of the principal point [px]")
+    baseline: float | None = Field(None, description="distance between the cameras [m]")
     pixel_noise_px: float = Field(
         0.5, description="standard deviation of a matched pixel coordinate [px]"
     )
@@ -33,8 +39,18 @@ class RigFile(Settings):
     )
 
 
-def read_rig(path: Path) -> tuple[StereoRig, WorldConvention]:
+class GivenRig(NamedTuple):
+    """The content of a file."""
+
+    rig: StereoRig | None  #: None if the file has no numbers of the images
+    world: WorldConvention
+    T_base_camera: Floats  #: shape (4, 4)
+
+
+def read_rig(path: Path) -> GivenRig:
     """Return the rig and the world convention of a file.
+
+    The numbers of the images (`IMAGE_KEYS`) are needed for features in pixels only.
 
     Raises
     ------
@@ -46,7 +62,13 @@ def read_rig(path: Path) -> tuple[StereoRig, WorldConvention]:
     try:
         values = RigFile(**content).model_dump(exclude_none=True)
         world = values.pop("world")
-        return StereoRig(**values), world
+        given = [key for key in IMAGE_KEYS if key in values]
+        missing = [key for key in IMAGE_KEYS if key not in values]
+        if given and missing:
+            hint = f"Give all of {', '.join(IMAGE_KEYS)}, or none."
+            raise InputError(missing[0], "a value", "none", hint=hint)
+        T_base_camera = check_transform("T_base_camera", values.get("T_base_camera", np.eye(4)))
+        return GivenRig(StereoRig(**values) if given else None, world, T_base_camera)
     except InputError as error:
         raise FileFormatError(
             path, f"{error.name} to be {error.expected}", error.got, hint=error.hint

@@ -22,6 +22,15 @@ class DriveSettings(Settings):
     stops: tuple[tuple[float, float, float], ...] = Field(
         min_length=1, description="x, y [m, map] and yaw [deg]; turns take the shorter way"
     )
+    heights: tuple[float, ...] = Field(
+        (), description="height of base_link above the ground at each stop; default: 0 [m]"
+    )
+    pitches: tuple[float, ...] = Field(
+        (), description="downward pitch of base_link at each stop; default: 0 [deg]"
+    )
+    rolls: tuple[float, ...] = Field(
+        (), description="roll of base_link to the right at each stop; default: 0 [deg]"
+    )
     every: float = Field(1.0, gt=0, description="largest distance between views [m]")
     every_turn: float = Field(0.5, gt=0, description="largest turn between views [rad]")
     seconds_per_view: float = Field(1.0, gt=0, description="time between views [s]")
@@ -52,7 +61,8 @@ def drive(settings: DriveSettings, rng: np.random.Generator) -> Drive:
     Raises
     ------
     InputError
-        A stop that is not finite or farther than 1e8 m from the origin; more than 100,000 views.
+        A stop that is not finite or farther than 1e8 m from the origin; another number of heights,
+        pitches or rolls than of stops; more than 100,000 views.
 
     Examples
     --------
@@ -60,12 +70,26 @@ def drive(settings: DriveSettings, rng: np.random.Generator) -> Drive:
     >>> len(drive(settings, np.random.default_rng(1)).times)
     8
     """
-    poses = _along(settings)
-    logged = _add_drift(poses, settings)
-    noise = rng.normal(size=poses.shape)
+    flat, tilted = np.split(_along(settings), [3], axis=1)
+    logged = _add_drift(flat, settings)
+    noise = rng.normal(size=flat.shape)
     logged += noise * (settings.position_noise, settings.position_noise, settings.yaw_noise)
-    times = settings.seconds_per_view * np.arange(len(poses), dtype=np.float64)
-    return Drive(to_transforms(poses), to_transforms(logged), times)
+    times = settings.seconds_per_view * np.arange(len(flat), dtype=np.float64)
+    tilts = to_tilts(tilted)
+    return Drive(to_transforms(flat) @ tilts, to_transforms(logged) @ tilts, times)
+
+
+def to_tilts(tilted: Floats) -> Floats:
+    """Return transforms, shape (n, 4, 4), of heights [m], downward pitches and rolls [rad]."""
+    z, pitch, roll = tilted.T
+    lifts, pitches, rolls = np.tile(np.eye(4), (3, len(z), 1, 1))
+    lifts[:, 2, 3] = z
+    pitches[:, 0, 0] = pitches[:, 2, 2] = np.cos(pitch)
+    pitches[:, 0, 2], pitches[:, 2, 0] = np.sin(pitch), -np.sin(pitch)
+    rolls[:, 1, 1] = rolls[:, 2, 2] = np.cos(roll)
+    rolls[:, 1, 2], rolls[:, 2, 1] = -np.sin(roll), np.sin(roll)
+    transforms: Floats = lifts @ pitches @ rolls
+    return transforms
 
 
 def to_transforms(poses: npt.ArrayLike) -> Floats:
@@ -81,17 +105,19 @@ def to_transforms(poses: npt.ArrayLike) -> Floats:
 
 
 def _along(settings: DriveSettings) -> Floats:
-    """Return x, y [m] and yaw [rad] of each view."""
+    """Return x, y [m], yaw [rad], z [m], pitch and roll [rad] of each view."""
     stops = as_floats("stops", settings.stops, (None, 3))
     check_finite("stops", stops)
     farthest = np.abs(stops[:, :2]).max()
     if farthest > FARTHEST:
         raise InputError("stops", f"places within {FARTHEST:g} m of the origin", f"{farthest:g} m")
-    stops = np.column_stack([stops[:, :2], np.unwrap(np.radians(stops[:, 2]))])
+    z, pitch, roll = (_at_stops(name, settings) for name in ("heights", "pitches", "rolls"))
+    turned = np.unwrap(np.radians(np.column_stack([stops[:, 2], pitch, roll])), axis=0)
+    stops = np.column_stack([stops[:, :2], turned[:, 0], z, turned[:, 1:]])
     moves = np.diff(stops, axis=0)
     with np.errstate(over="ignore"):  # too long drives are refused below
-        lengths = np.hypot(moves[:, 0], moves[:, 1]) / settings.every
-        turns = np.abs(moves[:, 2]) / settings.every_turn
+        lengths = np.hypot(np.hypot(moves[:, 0], moves[:, 1]), moves[:, 3]) / settings.every
+        turns = np.abs(moves[:, [2, 4, 5]]).max(axis=1) / settings.every_turn
     steps = np.maximum(np.ceil(np.maximum(lengths, turns)), 1.0)
     if not steps.sum() <= MOST_VIEWS:
         raise InputError(
@@ -106,6 +132,20 @@ def _along(settings: DriveSettings) -> Floats:
         for stop, count, move in zip(stops[:-1], counts, moves, strict=True)
     ]
     return np.concatenate([*poses, stops[-1:]])
+
+
+def _at_stops(name: str, settings: DriveSettings) -> Floats:
+    """Return a setting with a number for each stop; zeros by default."""
+    values, count = getattr(settings, name), len(settings.stops)
+    if not values:
+        return np.zeros(count)
+    numbers = as_floats(name, values, (None,))
+    check_finite(name, numbers)
+    if len(numbers) != count:
+        raise InputError(name, f"a number for each of the {count} stops", f"{len(numbers)}")
+    if np.abs(numbers).max() > FARTHEST:
+        raise InputError(name, f"numbers up to {FARTHEST:g}", f"{np.abs(numbers).max():g}")
+    return numbers
 
 
 def _add_drift(poses: Floats, settings: DriveSettings) -> Floats:

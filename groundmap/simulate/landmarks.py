@@ -51,9 +51,10 @@ class _Face(NamedTuple):
 def sample_landmarks(world: World, rng: np.random.Generator) -> Landmarks:
     """Sample the landmarks of a world, in the densities of its solids and its ground.
 
-    Points are sampled uniformly on upright faces, on tops and on the ground. Segments are sampled
-    on upright faces and on the ground, and placed along the upper and upright edges of the solids
-    that have `edges`, in pieces of at most 1.2 m.
+    Points are sampled uniformly on upright faces, on tops, on undersides with a texture and on the
+    ground. Segments are sampled on upright faces and on the ground, and placed along the upper and
+    upright edges of the solids that have `edges` (and the lower edges, if their underside has a
+    texture), in pieces of at most 1.2 m.
 
     Parameters
     ----------
@@ -76,7 +77,8 @@ def sample_landmarks(world: World, rng: np.random.Generator) -> Landmarks:
     _check_number(world)
     points, segments = [_on_ground(world, rng)], [_lines_on_ground(world, rng)]
     for solid in world.solids:
-        points.append(np.concatenate([_on_faces(solid, rng), _on_top(solid, rng)]))
+        parts = [_on_faces(solid, rng), _on_top(solid, rng), _on_underside(solid, rng)]
+        points.append(np.concatenate(parts))
         segments.append(np.concatenate([_lines_on_faces(solid, rng), _edges(solid)]))
     return Landmarks(_join(points), _join(segments))
 
@@ -87,7 +89,9 @@ def _check_number(world: World) -> None:
         count += world.ground_texture * hole.outline.length * hole.depth
     for solid in world.solids:
         sides = solid.outline.length * (solid.top - solid.bottom)
-        count += (solid.texture + 2.0 * solid.lines) * sides + solid.texture * solid.outline.area
+        count += (solid.texture + 2.0 * solid.lines) * sides + (
+            solid.texture + solid.underside
+        ) * solid.outline.area
         count += solid.outline.length / LONGEST if solid.edges else 0.0
     if count > MOST:
         raise InputError(
@@ -182,7 +186,17 @@ def _faces(solid: Solid) -> Iterator[_Face]:
 
 def _on_faces(solid: Solid, rng: np.random.Generator) -> Floats:
     spots = [_spots(face, solid.texture, rng) for face in _faces(solid)]
-    return np.concatenate([np.empty((0, 3)), *spots])
+    return _below_top(solid, np.concatenate([np.empty((0, 3)), *spots]))
+
+
+def _below_top(solid: Solid, places: Floats) -> Floats:
+    """Return the points, or segments, that are not above the upper side of a solid with a slope."""
+    if solid.slope == (0.0, 0.0):
+        return places
+    heights = solid.top_at(places.reshape(-1, 3)[:, :2]).reshape(places.shape[:-1])
+    below = places[..., 2] <= heights
+    kept: Floats = places[below if below.ndim == 1 else below.all(axis=1)]
+    return kept
 
 
 def _spots(face: _Face, density: float, rng: np.random.Generator) -> Floats:
@@ -192,11 +206,24 @@ def _spots(face: _Face, density: float, rng: np.random.Generator) -> Floats:
 
 
 def _on_top(solid: Solid, rng: np.random.Generator) -> Floats:
+    on_top = _over_outline(solid, solid.texture, rng)
+    return np.column_stack([on_top, solid.top_at(on_top) + OFF])
+
+
+def _on_underside(solid: Solid, rng: np.random.Generator) -> Floats:
+    if solid.underside == 0.0:  # without a draw, which would change the landmarks that follow
+        return np.empty((0, 3))
+    below = _over_outline(solid, solid.underside, rng)
+    return np.column_stack([below, np.full(len(below), solid.bottom - OFF)])
+
+
+def _over_outline(solid: Solid, density: float, rng: np.random.Generator) -> Floats:
+    """Sample places in the outline of a solid, shape (n, 2)."""
     xmin, ymin, xmax, ymax = solid.outline.bounds
-    count = rng.poisson(solid.texture * (xmax - xmin) * (ymax - ymin))
+    count = rng.poisson(density * (xmax - xmin) * (ymax - ymin))
     places = rng.uniform((xmin, ymin), (xmax, ymax), (count, 2))
-    on_top = places[shapely.contains_xy(solid.outline, places)]
-    return np.column_stack([on_top, np.full(len(on_top), solid.top + OFF)])
+    inside: Floats = places[shapely.contains_xy(solid.outline, places)]
+    return inside
 
 
 def _lines_on_faces(solid: Solid, rng: np.random.Generator) -> Floats:
@@ -206,7 +233,7 @@ def _lines_on_faces(solid: Solid, rng: np.random.Generator) -> Floats:
             _strokes(face.corner, face.along, face.up, solid.lines * face.area, rng),
             _strokes(face.corner, face.up, face.along, solid.lines * face.area, rng),
         ]
-    return np.concatenate(strokes)
+    return _below_top(solid, np.concatenate(strokes))
 
 
 def _strokes(
@@ -222,12 +249,27 @@ def _strokes(
 
 
 def _edges(solid: Solid) -> Floats:
-    """Return the upper and the upright edges of a solid, each cut into equal pieces."""
+    """Return the upper and the upright edges of a solid, each cut into equal pieces.
+
+    The lower edges follow if its underside has a texture.
+    """
     if not solid.edges:
         return np.empty((0, 2, 3))
-    ways = [(face.corner + face.up, face.along) for face in _faces(solid)]
-    ways += [(face.corner, face.up) for face in _faces(solid)]
-    return np.concatenate([_cut(start, way) for start, way in ways])
+    faces = list(_faces(solid))
+    ways = [_upper_edge(solid, face) for face in faces]
+    ways += [(face.corner, _upper_edge(solid, face)[0] - face.corner) for face in faces]
+    if solid.underside > 0.0:
+        ways += [(face.corner - (0.0, 0.0, OFF), face.along) for face in faces]
+    return np.concatenate([_cut(start, way) for start, way in ways if way.any()])
+
+
+def _upper_edge(solid: Solid, face: _Face) -> tuple[Floats, Floats]:
+    """Return the start of a face's upper edge, and the way to its end."""
+    if solid.slope == (0.0, 0.0):
+        return face.corner + face.up, face.along
+    ends = np.stack([face.corner, face.corner + face.along])
+    ends[:, 2] = np.maximum(solid.top_at(ends[:, :2]), solid.bottom)
+    return ends[0], ends[1] - ends[0]
 
 
 def _cut(start: Floats, way: Floats) -> Floats:

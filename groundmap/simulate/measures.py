@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
-import shapely
 from scipy.ndimage import binary_dilation, distance_transform_edt
 from scipy.spatial import cKDTree
 
 from groundmap.arrays import Bools, Floats
 from groundmap.evaluate.held_out import NEAR, cells_around, near_nonfree
 from groundmap.grid.window import CellState, GridWindow
-from groundmap.simulate.truth import HAIR, Truth
+from groundmap.simulate.known_map import KnownMap
+from groundmap.simulate.truth import HAIR
 
 JUDGED_RANGE = 10.0  # [m], farther boundaries are not measured
 
@@ -36,17 +36,23 @@ class Measures:
     boundary_mean: float | None  #: mean error of borders within 10 m of a view [m]
     boundary_p95: float | None  #: its 95th percentile [m]
     unknown: float | None  #: share unknown or contested, of truly free visible cells
-    visible_m2: float  #: area truly free and visible [m²]
+    visible_m2: float | None = None  #: area truly free and visible [m²]; None in 3-D
+    visible_m3: float | None = None  #: in 3-D its volume [m³]
+
+    def to_dict(self) -> dict[str, float | None]:
+        """Return the measures by name, with area or volume."""
+        other = "visible_m3" if self.visible_m3 is None else "visible_m2"
+        return {name: value for name, value in asdict(self).items() if name != other}
 
 
-def measure(window: GridWindow, truth: Truth) -> Measures:
+def measure(window: GridWindow, truth: KnownMap) -> Measures:
     """Return the measures of a map.
 
     Parameters
     ----------
     window : GridWindow
         The map, on the cells of the truth.
-    truth : Truth
+    truth : Truth, or VoxelTruth for a 3-D map
     """
     states = window.states()
     free, nonfree = states == CellState.FREE, states == CellState.NONFREE
@@ -54,12 +60,13 @@ def measure(window: GridWindow, truth: Truth) -> Measures:
     judged = truth.visible | _cells_holding(window, truth.surfaces)
     false = free & (truth.nonfree | ~truth.in_line)
     depths = _depths(window, truth)[false]
+    centres = window.cell_to_world(np.argwhere(nonfree & judged))
     borders = _borders(window, nonfree, free, truth)
     return Measures(
         free_recall=_share((free & open_ground).sum(), open_ground.sum()),
         free_precision=_share((free & judged & ~truth.nonfree).sum(), (free & judged).sum()),
         nonfree_recall=_mean(near_nonfree(window, states, truth.surfaces)),
-        nonfree_precision=_mean(_to_obstacles(window, nonfree & judged, truth) <= NEAR),
+        nonfree_precision=_mean(truth.to_obstacles(centres) <= NEAR),
         false_free=_share(len(depths), free.sum()),
         false_free_beyond_cell=_share((depths > window.resolution).sum(), free.sum()),
         false_free_beyond=_share((depths > NEAR).sum(), free.sum()),
@@ -67,7 +74,7 @@ def measure(window: GridWindow, truth: Truth) -> Measures:
         boundary_mean=_mean(borders),
         boundary_p95=float(np.percentile(borders, 95.0)) if len(borders) else None,
         unknown=_share((~(free | nonfree) & open_ground).sum(), open_ground.sum()),
-        visible_m2=float(open_ground.sum()) * window.resolution**2,
+        **{f"visible_m{states.ndim}": float(open_ground.sum()) * window.resolution**states.ndim},
     )
 
 
@@ -87,7 +94,7 @@ def _cells_holding(window: GridWindow, points: Floats) -> Bools:
     return held
 
 
-def _depths(window: GridWindow, truth: Truth) -> Floats:
+def _depths(window: GridWindow, truth: KnownMap) -> Floats:
     """Return the depth of each cell in space that must not be free, (rows, cols) [m].
 
     The distance from its centre to the border of the nearest cell that is truly free and in the
@@ -101,31 +108,19 @@ def _depths(window: GridWindow, truth: Truth) -> Floats:
     return depths
 
 
-def _to_obstacles(window: GridWindow, cells: Bools, truth: Truth) -> Floats:
-    """Return the distance from the centres of cells to the nearest obstacle [m]; 0 inside."""
-    points = shapely.points(window.cell_to_world(np.argwhere(cells)))
-    if truth.obstacles.is_empty:
-        return np.full(len(points), np.inf)
-    shapely.prepare(truth.obstacles)
-    distances: Floats = shapely.distance(points, truth.obstacles)
-    return distances
-
-
-def _borders(window: GridWindow, nonfree: Bools, free: Bools, truth: Truth) -> Floats:
+def _borders(window: GridWindow, nonfree: Bools, free: Bools, truth: KnownMap) -> Floats:
     """Return the distances of mapped borders between free and non-free to true surfaces [m].
 
     Measured from the centre of each non-free cell beside a free one, within 10 m of a viewpoint.
     """
     beside = nonfree & binary_dilation(free)
     centres = window.cell_to_world(np.argwhere(beside))
-    if not len(centres) or truth.obstacles.is_empty:
+    if not len(centres):
         return np.empty(0)
     near, _ = cKDTree(truth.viewpoints).query(centres)
     in_view = truth.visible[beside]
     if len(truth.surfaces):
         in_view |= cKDTree(truth.surfaces).query(centres)[0] <= 1.0
     near[~in_view] = np.inf
-    outline = truth.obstacles.boundary
-    shapely.prepare(outline)
-    distances: Floats = shapely.distance(shapely.points(centres[near <= JUDGED_RANGE]), outline)
-    return distances
+    distances = truth.to_borders(centres[near <= JUDGED_RANGE])
+    return distances[np.isfinite(distances)]

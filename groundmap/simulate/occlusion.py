@@ -20,7 +20,9 @@ class Prisms(NamedTuple):
 
     edges: Floats  #: shape (e, 4) [m, map], x0, y0, x1, y1
     starts: Ints  #: shape (p + 1,), first edge of each prism
-    heights: Floats  #: shape (p, 2) [m], bottom and top
+    #: shape (p, 4) [m, m, m/m, m/m]: bottom; height of the top at x = y = 0, and its rise along x
+    #: and y
+    heights: Floats
 
 
 def opaque_prisms(world: World) -> Prisms:
@@ -35,14 +37,15 @@ def opaque_prisms(world: World) -> Prisms:
     """
     solids = [solid for solid in world.solids if not solid.transparent]
     return _prisms(
-        [solid.outline for solid in solids], [(solid.bottom, solid.top) for solid in solids]
+        [solid.outline for solid in solids],
+        [(solid.bottom, *solid.upper_plane) for solid in solids],
     )
 
 
 def ground_level_prisms(obstacles: shapely.Geometry) -> Prisms:
     """Return prisms that end sight along the ground, from `World.obstacles`."""
     outlines = list(shapely.get_parts(obstacles))
-    return _prisms(outlines, [(GROUND_LEVEL - 1.0, GROUND_LEVEL + 1.0)] * len(outlines))
+    return _prisms(outlines, [(GROUND_LEVEL - 1.0, GROUND_LEVEL + 1.0, 0.0, 0.0)] * len(outlines))
 
 
 def edges_of(outline: shapely.Geometry) -> Floats:
@@ -96,11 +99,13 @@ def _through_mouths(holes: Iterable[Hole], eye: Floats, targets: Floats) -> Bool
     return seen
 
 
-def _prisms(outlines: list[shapely.Polygon], heights: list[tuple[float, float]]) -> Prisms:
+def _prisms(
+    outlines: list[shapely.Polygon], heights: list[tuple[float, float, float, float]]
+) -> Prisms:
     pieces = [edges_of(outline) for outline in outlines]
     counts = [0, *(len(piece) for piece in pieces)]
     return Prisms(
         np.concatenate([np.empty((0, 4)), *pieces]),
         np.cumsum(counts, dtype=np.int64),
-        np.array(heights, dtype=np.float64).reshape(-1, 2),
+        np.array(heights, dtype=np.float64).reshape(-1, 4),
     )

@@ -12,6 +12,7 @@ from groundmap.arrays import Bools, Floats
 from groundmap.grid.window import GridWindow, cells_of, centres_of
 from groundmap.settings import MapperSettings
 from groundmap.simulate.drive import Drive
+from groundmap.simulate.known_map import KnownMap
 from groundmap.simulate.occlusion import (
     GROUND_LEVEL,
     Prisms,
@@ -27,32 +28,34 @@ SAME_PLACE = 1e-3  # [m], largest distance between samples of the same surface a
 
 
 @dataclass(frozen=True, eq=False)
-class Truth:
-    """The correct map of a world, on the cells of a window.
+class Truth(KnownMap):
+    """The correct 2-D map of a world.
+
+    Cells are visible along the ground, with only free ground between.
 
     Attributes
     ----------
     obstacles : shapely.Geometry [m, map]
         Obstacles to the robot at the end of the drive.
-    nonfree : ndarray of bool, shape (rows, cols)
-        Cells that overlap an obstacle.
-    visible : ndarray of bool, shape (rows, cols)
-        Cells of the ground whose centre is visible from some view: in both images, in range, with
-        only free ground between.
-    in_line : ndarray of bool, shape (rows, cols)
-        The same for a camera with a field of view of 360 degrees and unlimited range. Free cells of
-        a map outside of it lie in or behind a surface, which is the dangerous error.
-    surfaces : ndarray, shape (n, 2) [m, map]
-        Points along the outlines of obstacles, half a cell apart, that are visible from some view.
-    viewpoints : ndarray, shape (v, 2) [m, map]
     """
 
     obstacles: shapely.Geometry
-    nonfree: Bools
-    visible: Bools
-    in_line: Bools
-    surfaces: Floats
-    viewpoints: Floats
+
+    def to_obstacles(self, points: Floats) -> Floats:
+        """Return the distance of points to the nearest obstacle [m]; 0 inside, inf without any."""
+        return _distances(points, self.obstacles)
+
+    def to_borders(self, points: Floats) -> Floats:
+        """Return the distance of points to the nearest outline of an obstacle [m]."""
+        return _distances(points, self.obstacles.boundary)
+
+
+def _distances(points: Floats, geometry: shapely.Geometry) -> Floats:
+    if geometry.is_empty:
+        return np.full(len(points), np.inf)
+    shapely.prepare(geometry)
+    distances: Floats = shapely.distance(shapely.points(points), geometry)
+    return distances
 
 
 def truth_of(
@@ -76,7 +79,7 @@ def truth_of(
     """
     heights = settings.step_height, settings.robot_height
     at_end = world.at(float(moves.times[-1])).obstacles(*heights)
-    samples = _along_outlines(at_end, 0.5 * window.resolution)
+    samples = along_outlines(at_end, 0.5 * window.resolution)
     shape = window.count.shape
     centres = window.cell_to_world(np.argwhere(np.ones(shape, dtype=np.bool_)))
     sight = _Sight(centres, samples)
@@ -191,8 +194,16 @@ def _still_there(samples: Floats, now: World, heights: tuple[float, float]) -> B
     return there
 
 
-def _along_outlines(obstacles: shapely.Geometry, step: float) -> Floats:
-    """Return points `HAIR` in front of all edges, at most `step` apart, shape (n, 2) [m]."""
+def along_outlines(obstacles: shapely.Geometry, step: float) -> Floats:
+    """Return points `HAIR` in front of all edges, shape (n, 2) [m].
+
+    Parameters
+    ----------
+    obstacles : shapely.Geometry [m, map]
+        One or more polygons.
+    step : float [m]
+        Largest distance between points of an edge.
+    """
     pieces = [np.empty((0, 2))]
     for edge in edges_of(shapely.orient_polygons(obstacles)):
         start, along = edge[:2], edge[2:] - edge[:2]
@@ -225,7 +236,7 @@ def touched_cells(
     centres = centres_of(cells, origin, resolution)
     touched: Bools = shapely.contains_xy(obstacles, centres)
     on_outline = np.zeros(np.add(shape, 2), dtype=np.bool_)  # with a rim of one cell
-    samples = 1 + cells_of(_along_outlines(obstacles, 0.5 * resolution), origin, resolution)
+    samples = 1 + cells_of(along_outlines(obstacles, 0.5 * resolution), origin, resolution)
     inside = ((samples >= 0) & (samples < on_outline.shape)).all(axis=1)
     on_outline[tuple(samples[inside].T)] = True
     beside = binary_dilation(on_outline, structure=np.ones((3, 3)))

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely.affinity import translate
 
-from groundmap.arrays import as_floats, as_number, check_finite
+from groundmap.arrays import Floats, as_floats, as_number, check_finite
 from groundmap.errors import InputError
 
 FARTHEST = 1e8  # [m] from the origin to an outline; beyond, edges of centimetres are rounded away
@@ -27,8 +27,13 @@ class Solid:
         Its footprint, which may have holes.
     top, bottom : float [m]
         Heights above the ground; the bottom of a table top is above 0.
+    slope : (float, float), default (0, 0) [m/m]
+        Rise of its upper side along x and y, as of a ramp; `top` is then its highest point.
     texture : float, default 6 [1/m²]
         Point features on its sides and its top; 0 for a bare wall.
+    underside : float, default 0 [1/m²]
+        Point features on its underside, such as a ceiling's. With `edges`, its lower edges are then
+        matched as segments, too.
     lines : float, default 0.4 [1/m²]
         Segment features on its sides, in each direction.
     edges : bool, default True
@@ -47,7 +52,7 @@ class Solid:
     ------
     InputError
         An outline that is not a valid polygon or has no area, a top that is not above the bottom, a
-        density below 0.
+        slope down to below the bottom, a density below 0.
 
     Examples
     --------
@@ -60,7 +65,9 @@ class Solid:
     _: KW_ONLY
     top: float
     bottom: float = 0.0
+    slope: tuple[float, float] = (0.0, 0.0)
     texture: float = 6.0
+    underside: float = 0.0
     lines: float = 0.4
     edges: bool = True
     transparent: bool = False
@@ -77,7 +84,14 @@ class Solid:
             raise InputError("top", "a height above the bottom [m]", f"{bottom} to {top}")
         object.__setattr__(self, "bottom", bottom)
         object.__setattr__(self, "top", top)
-        for name in ("texture", "lines", "repeat"):
+        slope = as_floats("slope", self.slope, (2,))
+        check_finite("slope", slope)
+        object.__setattr__(self, "slope", tuple(slope.tolist()))
+        lowest = self.top_at(shapely.get_coordinates(self.outline)).min()
+        if lowest < bottom - THINNEST:
+            expected = "a slope whose lowest point is not below the bottom"
+            raise InputError("slope", expected, f"{lowest:g}, with a bottom of {bottom:g} [m]")
+        for name in ("texture", "underside", "lines", "repeat"):
             value = as_number(name, getattr(self, name), "a number of 0 or more", least=0.0)
             object.__setattr__(self, name, value)
         velocity = as_floats("velocity", self.velocity, (2,))
@@ -87,6 +101,20 @@ class Solid:
         if not since < until:
             raise InputError("present", "(from, until) [s]", f"{since} to {until}")
         object.__setattr__(self, "present", (since, until))
+
+    @property
+    def upper_plane(self) -> tuple[float, float, float]:
+        """Height of its upper side at x = y = 0 [m], and its rise along x and y [m/m]."""
+        if self.slope == (0.0, 0.0):
+            return self.top, 0.0, 0.0
+        rise = float((shapely.get_coordinates(self.outline) @ self.slope).max())
+        return self.top - rise, *self.slope
+
+    def top_at(self, places: Floats) -> Floats:
+        """Return the heights of its upper side at places, shape (n, 2) [m]."""
+        level, along_x, along_y = self.upper_plane
+        heights: Floats = level + along_x * places[:, 0] + along_y * places[:, 1]
+        return heights
 
     def is_there(self, time: float) -> bool:
         """Return whether it is present at a time [s]."""

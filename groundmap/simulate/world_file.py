@@ -15,7 +15,7 @@ from groundmap.simulate.world import Hole, Solid
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
-OF_SOLIDS = ("texture", "lines", "edges", "transparent", "repeat", "velocity")
+OF_SOLIDS = ("slope", "texture", "underside", "lines", "edges", "transparent", "repeat", "velocity")
 TOP, TABLE_TOP = 2.5, 0.75  # [m], defaults
 
 
@@ -47,7 +47,11 @@ class SolidSettings(_Shaped):
         None, description="height of its top; default: 2.5, for a table 0.75 [m]"
     )
     bottom: float = Field(0.0, description="height of its underside [m]")
+    slope: tuple[float, float] = Field(
+        (0.0, 0.0), description="rise of its upper side along x and y; top is its highest point"
+    )
     texture: float = Field(6.0, ge=0, description="point features on it [1/m²]")
+    underside: float = Field(0.0, ge=0, description="point features on its underside [1/m²]")
     lines: float = Field(0.4, ge=0, description="segments on it, in each direction [1/m²]")
     edges: bool = Field(True, description="whether its edges are matched as segments")
     transparent: bool = Field(False, description="whether it is glass")

@@ -155,6 +155,20 @@ class StereoRig:
             xyz.reshape(*shape, 3), covariance.reshape(*shape, 3, 3), kept, +dropped
         )
 
+    def covariance_at(self, xyz: Floats) -> Floats:
+        """Return the covariance that positions would have if they were matched pixels.
+
+        Parameters
+        ----------
+        xyz : ndarray, shape (..., 3) [m, camera]
+
+        Returns
+        -------
+        ndarray, shape (..., 3, 3) [m², camera]
+        """
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+            return self._covariance(xyz, self.fx * self.baseline / xyz[..., 2])
+
     def _points(self, rows: Floats, disparity_px: Floats) -> Floats:
         scale = self.baseline / disparity_px
         x = (rows[..., 0] - self.cx) * scale

@@ -25,6 +25,7 @@ from planners.errors import AuditError
 from planners.problem.problem import PlanningProblem
 
 PIECE = 16  # [cells] longest piece of the line whose surroundings are read as one box
+MOST_CELLS = 2**22  # that are read as one box, unless a single piece needs more
 BATCH = 512  # pieces that are checked at once, which bounds the memory
 
 
@@ -153,6 +154,8 @@ def obstacles_near(
 ) -> Obstacles:
     """Return the cells within reach of the footprint along a line that it must not touch.
 
+    A cell near several parts of a long line may be returned more than once.
+
     These are the non-free cells, those that the newest views saw as non-free, those that are kept
     out and, where the problem avoids unknown space, the unknown and contested ones, including
     everything outside the map and excluding unknown cells near the start that
@@ -168,6 +171,11 @@ def obstacles_near(
     """
     low, high = np.minimum(*pieces), np.maximum(*pieces)
     reach = problem.radius + 2.0 * problem.grid.resolution
+    sides = high.max(axis=0) - low.min(axis=0) + 2.0 * reach
+    if len(low) > 1 and np.prod(sides / problem.grid.resolution) > MOST_CELLS:
+        halves = zip(*(np.array_split(ends, 2) for ends in pieces), strict=True)
+        parts = [obstacles_near(problem, half, tolerance) for half in halves]
+        return Obstacles(*map(np.concatenate, zip(*parts, strict=True)))
     window = problem.grid.window(
         np.concatenate([low.min(axis=0) - reach, high.max(axis=0) + reach])
     )

@@ -26,6 +26,7 @@ LISTS = ("waypoints", "headings", "warnings")
 PROGRESS_INTERVAL = 2.0  # [s], between two lines of progress without a terminal
 TABLE_WIDTH = 100_000  # characters: wider than any table, so that no cell is wrapped or cut
 
+MAP_HELP = "A map: .npz, .yaml (map_server), .map, .3dmap."
 JsonOption = Annotated[
     bool, typer.Option("--json", help="Print one JSON object, and nothing else, on stdout.")
 ]

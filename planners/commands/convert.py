@@ -9,13 +9,11 @@ import typer
 
 from groundmap.files.archive import check_writable
 from groundmap.io import export, files_of, files_written, load_map
-from planners.commands.console import JsonOption, emit, numbers
+from planners.commands.console import MAP_HELP, JsonOption, emit, numbers
 
 
 def convert_command(
-    map_file: Annotated[
-        Path, typer.Argument(metavar="IN", help="A map: .npz, .yaml (map_server), .map, .3dmap.")
-    ],
+    map_file: Annotated[Path, typer.Argument(metavar="IN", help=MAP_HELP)],
     out: Annotated[
         Path,
         typer.Argument(help=".npz: dense arrays; .yaml and .pgm: a map of Nav2's map_server."),

@@ -8,9 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from groundmap import CellState, GroundMapper, View, fit_ground, pose_jumps, read_views
+from groundmap import CellState, GroundMapper, View, fit_ground, pose_jumps
 from groundmap.arrays import Floats
-from groundmap.errors import InputError
 from groundmap.files.archive import check_writable
 from groundmap.mapper import warm_up
 from groundmap.stopwatch import Stopwatch
@@ -24,21 +23,36 @@ from planners.commands.console import (
     show_progress,
 )
 from planners.commands.settings_file import ConfigOption, read_settings
+from planners.commands.sources import (
+    CameraHeightOption,
+    FormatOption,
+    GuessOption,
+    LevelOption,
+    PointNoiseOption,
+    PosesOption,
+    ScaleOption,
+    ScalePointsOption,
+    open_source,
+)
 
 SHOWN_JUMPS = 5  # jumps of the poses, one warning each
 NOT_MAPPING = {"startup", "read", "compile", "save", "other"}
 
 
 def map_command(
-    source: Annotated[Path, typer.Argument(help="Folder with a log of views.")],
+    source: Annotated[
+        Path,
+        typer.Argument(help="Folder with a log of views, or the map of a SLAM or SfM system."),
+    ],
     out: Annotated[Path, typer.Option(help="File of the map: .npz.")],
-    poses: Annotated[
-        Path | None,
-        typer.Option(help="File with poses to use instead: TUM rows, or id + 16 numbers."),
-    ] = None,
-    format: Annotated[
-        str | None, typer.Option(help="Format of the log; default: detected from its files.")
-    ] = None,
+    poses: PosesOption = None,
+    format: FormatOption = None,
+    scale: ScaleOption = None,
+    scale_points: ScalePointsOption = None,
+    camera_height: CameraHeightOption = None,
+    level: LevelOption = None,
+    point_noise: PointNoiseOption = None,
+    guess_visibility: GuessOption = False,
     resolution: Annotated[
         float | None, typer.Option(help="Side of a cell [m]; default: 0.1524 m.")
     ] = None,
@@ -53,10 +67,6 @@ def map_command(
     ] = None,
     max_range: Annotated[
         float | None, typer.Option(help="Drop farther features [m]; default: 20 m.")
-    ] = None,
-    camera_height: Annotated[
-        float | None,
-        typer.Option(help="Height of the camera above level ground [m]; default: fitted."),
     ] = None,
     config: ConfigOption = None,
     as_json: JsonOption = False,
@@ -77,19 +87,33 @@ def map_command(
     with stopwatch.measure("compile"):
         warm_up(mapper.settings)
     with stopwatch.measure("read"):
-        log = read_views(source, format=format, poses=poses)
-        total = len(log)
-    if total == 0:
-        raise InputError(str(source), "at least one view", "none")
-    views = fit_ground(stopwatch.each("read", log), camera_height=camera_height, **tables["ground"])
-    timed = stopwatch.each("ground", views)
-    sample, jumps = _integrate(mapper, show_progress(timed, total=total, what="mapping views"))
-    warnings = _warnings(mapper, sample) + _jump_warnings(jumps)
+        opened = open_source(
+            source,
+            format=format,
+            poses=poses,
+            scale=scale,
+            scale_points=scale_points,
+            camera_height=camera_height,
+            level=level,
+            point_noise=point_noise,
+            guess_visibility=guess_visibility,
+        )
+    views = fit_ground(
+        stopwatch.each("read", opened.views),
+        camera_height=opened.camera_height,
+        **tables["ground"],
+    )
+    timed = opened.watch(stopwatch.each("ground", views))
+    shown = show_progress(timed, total=len(opened.views), what="mapping views")
+    sample, jumps = _integrate(mapper, shown)
+    for sentence in opened.sentences():
+        print_message(sentence)
+    warnings = opened.warnings() + _warnings(mapper, sample) + _jump_warnings(jumps)
     for warning in warnings:
         print_message(f"warning: {warning}")
     with stopwatch.measure("save"):
         mapper.grid.save(out)
-    summary = _summary(mapper, jumps, stopwatch, out) | {"warnings": warnings}
+    summary = _summary(mapper, jumps, stopwatch, out) | opened.summary() | {"warnings": warnings}
     emit(summary, as_json=as_json, title=f"map of {source}")
 
 

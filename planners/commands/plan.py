@@ -14,6 +14,7 @@ from groundmap.files.archive import check_writable
 from groundmap.io import files_of, load_map
 from groundmap.io.map_images import BlockedMap, grid_of
 from planners.commands.console import (
+    MAP_HELP,
     JsonOption,
     emit,
     emit_rows,
@@ -46,9 +47,7 @@ SETTINGS = "; ".join(
 
 
 def plan_command(
-    map_file: Annotated[
-        Path, typer.Argument(metavar="MAP", help="A map: .npz, .yaml (map_server), .map, .3dmap.")
-    ],
+    map_file: Annotated[Path, typer.Argument(metavar="MAP", help=MAP_HELP)],
     start: Annotated[
         str, typer.Option(metavar="X,Y[,YAW]", help="Start [m, rad; map]; on a 3-D map: X,Y,Z.")
     ],

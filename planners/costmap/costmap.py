@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import Bools, Bytes, Ints, Ints32
+from groundmap.arrays import Bools, Bytes, Counts, Floats, Floats32, Ints, Ints32
 from groundmap.grid.window import GridWindow
-from planners.costmap.extent import padded_window
+from planners.costmap.extent import padded_box
 from planners.costmap.kernels.moves import DIAGONAL, ONE
 from planners.costmap.layers import Layers, cap, layers_of
 from planners.costmap.map_space import MapSpace
@@ -54,6 +54,7 @@ class Costmap(MapSpace):
     ((68, 68), 31.5, [255, 255, 253, 0, 0])
     """
 
+    window: GridWindow
     squared: Ints32
     costs: Bytes
 
@@ -67,7 +68,7 @@ class Costmap(MapSpace):
             A 3-D map, or one with too many cells.
         """
         problem.check_dimensions(2)
-        window = padded_window(problem)
+        window = problem.grid.read(padded_box(problem))
         return cls(problem, window, *layers_of(problem, window))
 
     def with_changes(self, changed: npt.ArrayLike) -> Costmap:
@@ -136,6 +137,16 @@ class Costmap(MapSpace):
     def uniform(self) -> bool:
         """Whether all cells have the same cost."""
         return self.top == 0.0
+
+    def evidence_at(self, cells: Ints) -> tuple[Floats32, Counts]:
+        """Return the confidence and the count of cells, given by their indices, shape (n,) each."""
+        at = tuple(cells.T)
+        return self.window.confidence[at], self.window.count[at]
+
+    def weights_at(self, cells: Ints) -> Floats:
+        """Return what a metre costs in cells, given by their indices, shape (n,) [m/m]."""
+        weights: Floats = 1.0 + self.costs[tuple(cells.T)] * (self.top / MAX_NON_OBSTACLE)
+        return weights
 
     @cached_property
     def steps(self) -> Ints:

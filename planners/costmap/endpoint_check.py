@@ -12,11 +12,11 @@ from typing import TypeAlias
 import numpy as np
 from scipy import ndimage
 
-from groundmap.arrays import Bools, Floats, Ints
-from groundmap.grid.window import CellState
+from groundmap.arrays import Bools, Floats
 from planners.costmap.costmap import Costmap
-from planners.costmap.endpoints import centres_around, links
+from planners.costmap.endpoints import links
 from planners.costmap.map_space import MapSpace
+from planners.costmap.regions import connected_to, largest_region, nearest_cells
 from planners.costmap.voxel_map import Voxels
 from planners.error_messages import Place, Point, format_point
 from planners.errors import (
@@ -125,12 +125,20 @@ def check_space(space: MapSpace, place: Place, pose: Pose, *, headings: bool = F
 
 def _causes(space: MapSpace) -> list[Cause]:
     """Return the kinds of blocked cells, with the errors that name them, by precedence."""
-    nonfree = space.window.states(epsilon=space.problem.epsilon) == CellState.NONFREE
-    checks: list[Cause] = [(space.blocked & nonfree, NonFreeError)]
-    if space.kept_out is not None:
-        checks.insert(0, (space.kept_out, KeepOutError))
-    if space.recent is not None:
-        checks.append((space.recent & ~nonfree, partial(NonFreeError, recent=True)))
+    nonfree = space.nonfree.copy()
+    checks: list[Cause] = [(nonfree, NonFreeError)]
+    for mask, error in (
+        (space.recent, partial(NonFreeError, recent=True)),
+        (space.kept_out, KeepOutError),
+    ):
+        if mask is not None:
+            only = np.argwhere(mask)
+            confidence, _ = space.evidence_at(only)
+            only = only[confidence < space.problem.epsilon]
+            nonfree[tuple(only.T)] = False
+            checks.append((mask, error))
+    # Of recent cells, those that the map does not call non-free; all of keep-out areas.
+    checks.sort(key=lambda check: check[1] is not KeepOutError)
     return [*checks, (space.blocked & ~space.nonfree, UnknownSpaceError)]
 
 
@@ -149,9 +157,7 @@ def check_start_is_known(space: MapSpace) -> None:
     UnknownSpaceError
     """
     xy = space.problem.start_xy
-    parts, _ = ndimage.label(~space.blocked)
-    part = parts[tuple(space.window.world_to_cell(xy)[0])]
-    island: Bools = (parts == part) & (part > 0)
+    island = connected_to(~space.blocked, space.window.world_to_cell(xy))
     unknown = space.blocked & ~space.nonfree
     ends_in_unknown = (ndimage.binary_dilation(island) & unknown).any()
     if ends_in_unknown and not (island & ~space.cleared).any():
@@ -187,11 +193,12 @@ def nearest_place(
     free = space.traversable if yaw is None else ~space.blocked
     other = problem.goal_xy if place == "start" else problem.start_xy
     radius = space.radius if yaw is None else 0.0
-    cells = np.argwhere(region_around(space, free, other, radius=radius, or_largest=True))
-    centres: Floats = space.window.cell_to_world(cells)
-    away = np.hypot.reduce(centres - xy, axis=1)
+    region = region_around(space, free, other, radius=radius, or_largest=True)
     if yaw is None:
-        return tuple(centres[away.argmin()].tolist()) if len(away) else None
+        nearest, distance = nearest_cells(space.window, region, xy)
+        return tuple(nearest.tolist()) if distance < math.inf else None
+    centres: Floats = space.window.cell_to_world(np.argwhere(region))
+    away = np.hypot.reduce(centres - xy, axis=1)
     for index in np.argsort(away, kind="stable"):
         centre: Point = tuple(centres[index].tolist())
         if _fits(space, space.blocked, centre, yaw):
@@ -217,23 +224,10 @@ def region_around(
     or_largest : bool, default False
         Whether to return the largest region if the place is connected to no cell.
     """
-    parts, count = ndimage.label(free)
-    around = np.unique(parts[tuple(_cells_around(space, xy, radius=radius).T)])
-    around = around[around > 0]
-    if or_largest and len(around) == 0 and count > 0:
-        around = np.array([1 + np.bincount(parts.ravel())[1:].argmax()])
-    region: Bools = np.isin(parts, around)
-    return region
-
-
-def _cells_around(space: MapSpace, xy: Point, *, radius: float) -> Ints:
-    """Return the cells that a place is connected to; on voxels, the up to eight around it."""
-    if isinstance(space, Costmap):
-        return links(space, xy, radius=radius).cells
-    position = space.to_cells(xy)[0][::-1]
-    around = product(*(centres_around(at, 0.0) for at in position.tolist()))
-    cells = np.array(list(around), dtype=np.int64)
-    return cells[space.window.contains(cells)]
+    cells = links(space, xy, radius=radius).cells
+    if or_largest and not free[tuple(cells.T)].any():
+        return largest_region(free)
+    return connected_to(free, cells)
 
 
 def _check_in_window(space: MapSpace, place: Place, xy: Point) -> None:

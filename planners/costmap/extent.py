@@ -10,11 +10,12 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from groundmap.arrays import Bools, Floats, Ints, Ints32
-from groundmap.grid.window import GridWindow
+from groundmap.grid.window import CellBox
 from planners.errors import ProblemError
 from planners.problem.problem import PlanningProblem
 
-MOST_CELLS = 2**25  # of a costmap, which takes about 50 bytes per cell
+#: Cells by dimension: a costmap takes about 50 bytes per cell, `Voxels` and a search of them 12.
+MOST_CELLS = {2: 2**25, 3: 2**27}
 
 
 class _Tiles(NamedTuple):
@@ -25,7 +26,7 @@ class _Tiles(NamedTuple):
     part: Ints32  #: shape (n,): label of the connected part; tiles connect over sides and corners
 
 
-def padded_window(problem: PlanningProblem) -> GridWindow:
+def padded_box(problem: PlanningProblem) -> CellBox:
     """Return the cells that a problem is planned on, in any dimension.
 
     Raises
@@ -33,11 +34,11 @@ def padded_window(problem: PlanningProblem) -> GridWindow:
     ProblemError
         More than `MOST_CELLS` cells.
     """
-    return problem.grid.window(padded_bounds(problem))
+    return problem.grid.box(padded_bounds(problem))
 
 
 def padded_bounds(problem: PlanningProblem) -> Floats:
-    """Return the box of `padded_window`: lower then upper corner [m, map].
+    """Return the box of `padded_box`: lower then upper corner [m, map].
 
     It holds the observed tiles, the cleared start, and a ring of cells around them; if unknown
     cells are traversable, also the cells that are not to be entered. If the tiles span too many
@@ -57,11 +58,11 @@ def padded_bounds(problem: PlanningProblem) -> Floats:
         upper = np.maximum(upper, start + problem.clear_radius)
     if not problem.avoids_unknown:
         lower, upper = _with_imposed(problem, lower, upper)
-    cells = _cells(problem, lower, upper)
-    if cells > MOST_CELLS:
+    cells, most = _cells(problem, lower, upper), MOST_CELLS[problem.grid.ndim]
+    if cells > most:
         raise ProblemError(
             "footprint" if problem.cleared_at is None else "cleared_at",
-            f"at most {MOST_CELLS} cells in the box around the map and the cleared start",
+            f"at most {most} cells in the box around the map and the cleared start",
             f"{cells:.3g}, with {problem.clear_radius:g} m cleared around {problem.clear_place}",
             hint="Use a smaller footprint or clear_start_radius, or a map with larger cells.",
         )
@@ -90,11 +91,11 @@ def _with_imposed(problem: PlanningProblem, lower: Floats, upper: Floats) -> tup
         for corner in np.reshape(problem.keep_out_areas.bounds, (2, 2)):
             corners.append(np.concatenate([corner, lower[2:]]))
     box = np.min(corners, axis=0), np.max(corners, axis=0)
-    cells_in_box = _cells(problem, *box)
-    if cells_in_box > MOST_CELLS >= _cells(problem, lower, upper):
+    cells_in_box, most = _cells(problem, *box), MOST_CELLS[problem.grid.ndim]
+    if cells_in_box > most >= _cells(problem, lower, upper):
         raise ProblemError(
             "keep_out",
-            f"at most {MOST_CELLS} cells in the box around the map and the keep-out areas",
+            f"at most {most} cells in the box around the map and the keep-out areas",
             f"{cells_in_box:.3g}",
             hint="Clip the areas to the surroundings of the map.",
         )
@@ -109,17 +110,18 @@ def _cells(problem: PlanningProblem, lower: Floats, upper: Floats) -> float:
 def _tiles_box(problem: PlanningProblem) -> tuple[Floats, Floats]:
     """Return the corners of the box around the observed tiles, or around the reachable ones."""
     lower, upper = problem.grid.bounds().reshape(2, -1)
-    if _cells(problem, lower, upper) <= MOST_CELLS:
+    most = MOST_CELLS[problem.grid.ndim]
+    if _cells(problem, lower, upper) <= most:
         return lower, upper
     tiles = _tiles(problem)
     near = _reached(problem, tiles)
     if problem.avoids_unknown and near.any():
         lower, upper = tiles.lower[near].min(axis=0), tiles.upper[near].max(axis=0)
-        if _cells(problem, lower, upper) <= MOST_CELLS:
+        if _cells(problem, lower, upper) <= most:
             return lower, upper
     raise ProblemError(
         "grid",
-        f"at most {MOST_CELLS} cells in the box around the observed tiles",
+        f"at most {most} cells in the box around the observed tiles",
         f"{_cells(problem, lower, upper):.3g}{_far_tiles(tiles)}",
         hint="Use a map with larger cells.",
     )

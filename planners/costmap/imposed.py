@@ -7,20 +7,20 @@ import shapely
 
 from groundmap.arrays import Bools, Floats, Ints
 from groundmap.grid.cell_set import CellSet
-from groundmap.grid.window import GridWindow
+from groundmap.grid.window import CellFrame
 from planners.geometry.polyline import cross_cells
 from planners.problem.problem import PlanningProblem
 
 TOUCH = 1e-9  # [cells]: a polygon that reaches no deeper into a cell only touches it
 
 
-def imposed_cells(problem: PlanningProblem, window: GridWindow) -> Bools | None:
+def imposed_cells(problem: PlanningProblem, window: CellFrame) -> Bools | None:
     """Return which cells of a window are not to be entered, or None if there are no such areas.
 
     Parameters
     ----------
     problem : PlanningProblem
-    window : GridWindow
+    window : CellFrame
         In any dimension.
     """
     masks = [mask(problem, window) for mask in (keep_out_cells, recent_cells)]
@@ -28,24 +28,24 @@ def imposed_cells(problem: PlanningProblem, window: GridWindow) -> Bools | None:
     return np.logical_or.reduce(given) if given else None
 
 
-def recent_cells(problem: PlanningProblem, window: GridWindow) -> Bools | None:
+def recent_cells(problem: PlanningProblem, window: CellFrame) -> Bools | None:
     """Return which cells of a window the newest views saw as non-free, or None without any.
 
     Parameters
     ----------
     problem : PlanningProblem
-    window : GridWindow
+    window : CellFrame
     """
     return _mask_of(problem.recent_set, window) if len(problem.recent_set) else None
 
 
-def keep_out_cells(problem: PlanningProblem, window: GridWindow) -> Bools | None:
+def keep_out_cells(problem: PlanningProblem, window: CellFrame) -> Bools | None:
     """Return which cells of a window a keep-out area reaches into, or None without any.
 
     Parameters
     ----------
     problem : PlanningProblem
-    window : GridWindow
+    window : CellFrame
     """
     areas = problem.keep_out_areas
     if not areas:
@@ -64,9 +64,9 @@ def keep_out_cells(problem: PlanningProblem, window: GridWindow) -> Bools | None
     return mask
 
 
-def _mask_of(cells: CellSet, window: GridWindow) -> Bools:
+def _mask_of(cells: CellSet, window: CellFrame) -> Bools:
     first = np.rint((window.origin - cells.origin) / window.resolution).astype(np.int64)[::-1]
-    return cells.mask(first, window.count.shape)
+    return cells.mask(first, window.shape)
 
 
 def _reached(polygon: shapely.Polygon, shape: tuple[int, int]) -> Bools:

@@ -54,7 +54,8 @@ def occupancy_of(problem: PlanningProblem, window: GridWindow) -> Occupancy:
     if imposed is not None:
         states[imposed] = CellState.NONFREE
     nonfree = states == CellState.NONFREE
-    cleared = _near_start(problem, window) & (states == CellState.UNKNOWN)
+    cleared = _near_start(problem, window)
+    cleared &= states == CellState.UNKNOWN
     free = (states == CellState.FREE) | cleared
     return Occupancy(~free if problem.avoids_unknown else nonfree, nonfree, cleared, free)
 
@@ -106,7 +107,7 @@ def metres(squared: Ints32, resolution: float) -> Floats:
 
 def _near_start(problem: PlanningProblem, window: GridWindow) -> Bools:
     """Return the cells whose square or cube comes within the clear radius of the cleared place."""
-    near = np.zeros(window.count.shape, dtype=np.bool_)
+    near = np.zeros(window.shape, dtype=np.bool_)
     if not problem.clear_start:
         return near
     position = ((np.array(problem.clear_place) - window.origin) / window.resolution)[::-1]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -11,8 +12,8 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import Bools, Floats, Ints, Ints32
-from groundmap.grid.window import GridWindow
+from groundmap.arrays import Bools, Counts, Floats, Floats32, Ints, Ints32
+from groundmap.grid.window import CellFrame
 from planners.costmap.imposed import keep_out_cells, recent_cells
 from planners.costmap.kernels.distance import (
     NOWHERE,
@@ -30,6 +31,16 @@ SQUARED_DISTANCES = {2: squared_distances, 3: squared_distances_3d}
 LINE_CLEARANCE = {2: clearance.line_clearance, 3: clearance3d.line_clearance}
 
 
+def _segment_clearance_2d(blocked: Bools, a: Floats, b: Floats, limit: float) -> float:
+    return float(clearance.segment_clearance(blocked, a[0], a[1], b[0], b[1], limit))
+
+
+SEGMENT_CLEARANCE: dict[int, Callable[[Bools, Floats, Floats, float], float]] = {
+    2: _segment_clearance_2d,
+    3: clearance3d.segment_clearance,
+}
+
+
 @dataclass(frozen=True, eq=False)
 class MapSpace(ABC):
     """The cells of a map under the rules of a problem: a `Costmap`, or `Voxels` on a 3-D map.
@@ -37,7 +48,7 @@ class MapSpace(ABC):
     Attributes
     ----------
     problem : PlanningProblem
-    window : GridWindow
+    window : GridWindow, or CellBox on a 3-D map
         The observed tiles, surrounded by a ring of unknown cells that also encloses the cleared
         start. The ring stands for all unknown space outside.
     blocked, nonfree, cleared : ndarray of bool, shape (rows, cols) or (layers, rows, cols)
@@ -47,7 +58,7 @@ class MapSpace(ABC):
     """
 
     problem: PlanningProblem
-    window: GridWindow
+    window: CellFrame
     blocked: Bools
     nonfree: Bools
     cleared: Bools
@@ -56,6 +67,19 @@ class MapSpace(ABC):
     @abstractmethod
     def traversable(self) -> Bools:
         """Cells on whose centre the footprint's centre may be, shape as `blocked`."""
+
+    @abstractmethod
+    def evidence_at(self, cells: Ints) -> tuple[Floats32, Counts]:
+        """Return the confidence and the count of cells, given by their indices, shape (n,) each."""
+
+    @property
+    @abstractmethod
+    def uniform(self) -> bool:
+        """Whether all cells have the same cost."""
+
+    @abstractmethod
+    def weights_at(self, cells: Ints) -> Floats:
+        """Return what a metre costs in cells, given by their indices, shape (n,) [m/m]."""
 
     @property
     def radius(self) -> float:
@@ -118,6 +142,20 @@ class MapSpace(ABC):
     def area_of(self, cells: Bools) -> float:
         """Return the area of the cells of a mask [m²], on a 3-D map their volume [m³]."""
         return float(cells.sum()) * self.window.resolution**cells.ndim
+
+    def segment_clearance(self, a: Sequence[float], b: Sequence[float], limit: float) -> float:
+        """Return the distance from a segment to the nearest blocked cell, at most `limit` [cells].
+
+        Parameters
+        ----------
+        a, b : sequence of float, x first [cells]
+            Ends of the segment.
+        limit : float [cells]
+            Largest distance to search.
+        """
+        points = np.array(a, dtype=np.float64), np.array(b, dtype=np.float64)
+        segment_clearance = SEGMENT_CLEARANCE[self.blocked.ndim]
+        return segment_clearance(self.blocked, *points, limit)
 
     def clearance_of(
         self, points: npt.ArrayLike, *, to: Bools | None = None, limit: float = math.inf

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import combinations, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -66,11 +66,11 @@ def merge_collinear(points: Floats) -> Floats:
 
     Parameters
     ----------
-    points : ndarray, shape (n, 2), n >= 2 [m]
+    points : ndarray, shape (n, d), n >= 2 [m]
 
     Returns
     -------
-    ndarray, shape (m, 2), m >= 2 [m]
+    ndarray, shape (m, d), m >= 2 [m]
 
     Examples
     --------
@@ -85,8 +85,10 @@ def merge_collinear(points: Floats) -> Floats:
         kept = kept[:-1]
     line = np.concatenate([kept, points[-1:]])
     steps = np.diff(line, axis=0)
-    (ax, ay), (bx, by) = steps[:-1].T, steps[1:].T
-    turns = (ax * by != ay * bx) | (ax * bx + ay * by <= 0)
+    before, after = steps[:-1].T, steps[1:].T
+    turns = (before * after).sum(axis=0) <= 0
+    for i, j in combinations(range(len(before)), 2):
+        turns |= before[i] * after[j] != before[j] * after[i]
     turned: Floats = line[np.concatenate([[True], turns, [True]])]
     return turned
 

@@ -123,9 +123,8 @@ class Route:
         """
         waypoints = result.waypoints
         line = cross_cells(space.to_cells(waypoints))
-        at = tuple(line.cells.T)
-        sureness = -space.window.confidence[at].astype(np.float64)
-        unknown = space.window.count[at] == 0
+        confidence, count = space.evidence_at(line.cells)
+        sureness, unknown = -confidence.astype(np.float64), count == 0
         length, clearance = length_of(waypoints), space.clearance_of(waypoints)
         headings = result.headings
         return cls(

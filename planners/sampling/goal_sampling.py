@@ -10,6 +10,7 @@ import numpy as np
 
 from groundmap.arrays import Bools, Floats
 from groundmap.errors import SettingsError
+from planners.costmap.regions import nearest_cells
 from planners.costmap.voxel_map import Voxels
 from planners.errors import ProblemError
 from planners.problem.problem import Pose
@@ -189,10 +190,9 @@ def may_contain_goal(
         As for `goal_states`.
     """
     axes, window = validator.axes, validator.costmap.window
-    centres: Floats = window.cell_to_world(np.argwhere(cells))
     limit = settings.goal_radius + math.sqrt(axes) * window.resolution
     goals = _check_goals(validator, settings, goal)
-    return any((np.linalg.norm(centres - one[:axes], axis=1) <= limit).any() for one in goals)
+    return any(nearest_cells(window, cells, one[:axes])[1] <= limit for one in goals)
 
 
 def _is_valid(validator: MotionValidator, state: Pose, within: Bools | None) -> bool:

@@ -10,10 +10,10 @@ from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
-from scipy import ndimage
 
-from groundmap.arrays import Bools, Floats, Ints32
+from groundmap.arrays import Bools, Floats
 from planners.costmap.costmap import Costmap
+from planners.costmap.regions import connected_to
 from planners.costmap.voxel_map import Voxels
 from planners.geometry.kernels.curves import wrap
 from planners.problem.problem import Pose
@@ -70,10 +70,14 @@ class MotionValidator(ABC):
         Returns
         -------
         ndarray of bool, shape (rows, cols) or (layers, rows, cols)
+            Shared with other calls: it must not be changed.
         """
-        label = self._label_of(start)
-        region: Bools = np.logical_and(self._labels == label, label > 0)
-        return region
+        cell = self.cell_of(start)
+        if not self._last_region[cell]:
+            # The region of another start is the same one, or has no cell in common with it.
+            cells = self._possibly_clear()
+            self._last_region = connected_to(cells, np.array([cell]), corners=True)
+        return self._last_region
 
     def bounds(self, start: Pose, goal: Pose) -> Bounds | None:
         """Return the bounding box of the region of a start, or None if the goal is outside it.
@@ -87,10 +91,10 @@ class MotionValidator(ABC):
         tuple of float
             Low x, y (, z), high x, y (, z) [m, corner].
         """
-        label = self._label_of(start)
-        if label == 0 or label != self._label_of(goal):
+        region = self.region(start)
+        if not region[self.cell_of(goal)]:
             return None
-        return box_of(self._labels == label, self.costmap.window.resolution)
+        return box_of(region, self.costmap.window.resolution)
 
     def max_edge_length(self, region: Bools, bounds: Bounds) -> float:
         """Return an edge length [m] up to which many edges are clear.
@@ -124,15 +128,9 @@ class MotionValidator(ABC):
     def _interpolate(self, states: Sequence[Pose]) -> Floats:
         return np.array(states)
 
-    def _label_of(self, state: Pose) -> int:
-        return int(self._labels[self.cell_of(state)])
-
     @cached_property
-    def _labels(self) -> Ints32:
-        """Connected components of the possibly clear cells, numbered from 1; 0 elsewhere."""
-        cells = self._possibly_clear()
-        labels: Ints32 = ndimage.label(cells, structure=np.ones((3,) * cells.ndim))[0]
-        return labels
+    def _last_region(self) -> Bools:
+        return np.zeros_like(self.costmap.blocked)
 
     @abstractmethod
     def _possibly_clear(self) -> Bools:

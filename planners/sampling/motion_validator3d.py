@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from groundmap.arrays import Bools
+from groundmap.grid.window import slabs
 from planners.costmap.kernels.distance import NOWHERE
 from planners.costmap.voxel_map import Voxels
 from planners.sampling.kernels.edges3d import line_clear
@@ -47,7 +48,7 @@ class MotionValidator3D(MotionValidator):
 
     def __init__(self, costmap: Voxels) -> None:
         self.costmap = costmap
-        self.squared = costmap.all_squared
+        self.squared = costmap.near_squared
         numbers = costmap.window.resolution, costmap.radius, costmap.slack
         self.is_clear = partial(line_clear, self.squared, *numbers)
 
@@ -63,5 +64,8 @@ class MotionValidator3D(MotionValidator):
         return cells
 
     def _mean_clearance(self, region: Bools) -> float:
-        half_voxels = float(np.sqrt(self.squared[region]).mean())
-        return 0.5 * half_voxels * self.costmap.window.resolution
+        total = sum(
+            float(np.sqrt(self.squared[part][region[part]], dtype=np.float64).sum())
+            for part in slabs(region.shape)
+        )
+        return 0.5 * total / np.count_nonzero(region) * self.costmap.window.resolution

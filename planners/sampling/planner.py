@@ -40,6 +40,7 @@ from planners.search.base import Cancel, Clock, OnImproved, SearchResult
 
 # With several goals, BFMT crashes, and the threads of PRM and PRM* deadlock.
 SINGLE_GOAL = ("bfmt", "prm", "prmstar")
+EFFORT = "edges checked"
 
 
 class SamplingPlanner:
@@ -253,13 +254,15 @@ class SamplingPlanner:
         self, result: TaskResult, settings: SamplingSettings, clock: Clock
     ) -> NoRouteError:
         if clock.is_cancelled:
-            return CancelledError(self.name, seconds=clock.seconds, expanded=result.checked)
+            return CancelledError(
+                self.name, seconds=clock.seconds, expanded=result.checked, unit=EFFORT
+            )
         if clock.is_up and clock.time_limit is not None:
             return TimeLimitError(
                 self.name,
                 time_limit=clock.time_limit,
                 expanded=result.checked,
-                unit="edges checked",
+                unit=EFFORT,
                 left=result.left,
             )
         reason = REASONS.get(result.status, result.status)

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from groundmap.arrays import Bools
+from planners.costmap.regions import CellSample
 from planners.problem.problem import Pose
 from planners.sampling.motion_validator import MotionValidator
 from planners.sampling.settings import FLAT
@@ -60,7 +61,7 @@ class StateSampler:
         first: Iterable[Pose] = (),
     ) -> None:
         self.validator, self.size = validator, validator.costmap.window.resolution
-        self.cells, self.shape = np.flatnonzero(region), region.shape
+        self.cells = CellSample(region)
         self.random = np.random.default_rng(seed)
         self.yaw_weight = yaw_weight
         self._first = iter(tuple(first))
@@ -97,8 +98,7 @@ class StateSampler:
     def _draw(self) -> Iterator[Pose]:
         """Yield states, clear or not, uniformly from the cells of the region and all yaws."""
         while True:
-            drawn = self.cells[self.random.integers(len(self.cells), size=BATCH)]
-            cells = np.column_stack(np.unravel_index(drawn, self.shape)[::-1])  # x, y (, z)
+            cells = self.cells.draw(self.random, BATCH)[:, ::-1]  # x, y (, z)
             states = (cells + self.random.random(cells.shape)) * self.size
             if self.validator.space not in FLAT:
                 yaws = self.random.uniform(-math.pi, math.pi, BATCH)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from groundmap.arrays import Bools, Floats
+from groundmap.grid.window import slabs
 from planners.costmap.voxel_map import Voxels
 from planners.errors import TimeLimitError
 from planners.geometry.kernels.curves import wrap
@@ -118,21 +119,24 @@ def informed_region(
            [0, 1, 1, 1, 1, 1, 0],
            [0, 1, 1, 1, 1, 1, 0]])
     """
-    to_goal = np.full(region.shape, math.inf)
-    for goal in goals:
-        if clock is not None and clock.is_up:
-            return region
-        np.minimum(to_goal, _distances(region.shape, size, goal), out=to_goal)
-    lengths = _distances(region.shape, size, start) + to_goal
-    informed: Bools = region & (lengths <= max_length + math.sqrt(region.ndim) * size)
+    informed = region.copy()
+    for part in slabs(region.shape):
+        to_goal = np.full(region[part].shape, math.inf)
+        for goal in goals:
+            if clock is not None and clock.is_up:
+                return region
+            np.minimum(to_goal, _distances(part, region.shape, size, goal), out=to_goal)
+        lengths = _distances(part, region.shape, size, start) + to_goal
+        informed[part] &= lengths <= max_length + math.sqrt(region.ndim) * size
     return informed
 
 
-def _distances(shape: tuple[int, ...], size: float, state: Pose) -> Floats:
-    """Return the distances of the centres of cells to a state [m]."""
+def _distances(part: slice, shape: tuple[int, ...], size: float, state: Pose) -> Floats:
+    """Return the distances of the centres of a part of the first axis to a state [m]."""
     squared = np.zeros((1,) * len(shape))
     for axis, length in enumerate(shape):
-        gaps = (np.arange(length) + 0.5) * size - state[len(shape) - 1 - axis]
+        indices = np.arange(length) if axis else np.arange(part.start, part.stop)
+        gaps = (indices + 0.5) * size - state[len(shape) - 1 - axis]
         others = [k for k in range(len(shape)) if k != axis]
         squared = squared + np.expand_dims(gaps**2, others)
     distances: Floats = np.sqrt(squared)

@@ -73,7 +73,7 @@ class CaseResult(NamedTuple):
 def _run_simulated(scenario: Scenario) -> CaseResult:
     """Map a simulated world; compare map and routes with it."""
     simulated = simulate(scenario)
-    figures: dict[str, Figure] = dict(asdict(measure(simulated.window, simulated.truth)))
+    figures: dict[str, Figure] = dict(measure(simulated.window, simulated.truth).to_dict())
     figures |= moving_figures(simulated)
     answers = [run_query(query, simulated.grid) for query in scenario.queries]
     if answers:

@@ -104,7 +104,7 @@ def test_the_needed_clearance_is_exact_despite_rounding(radius: float, need: int
     assert squared_need(radius, 0.1) == need
 
 
-def test_everything_beyond_the_touched_tiles_is_blocked() -> None:
+def test_everything_beyond_the_observed_tiles_is_blocked() -> None:
     problem = PlanningProblem(
         grid_of(free_field(64, 64)), start=(9, 9), goal=(20, 20), footprint=1.0
     )

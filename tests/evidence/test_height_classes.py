@@ -327,7 +327,7 @@ def test_a_view_without_features_is_empty() -> None:
     assert [
         len(part) for part in (ground_view.points, ground_view.supports, ground_view.drop_offs)
     ] == [0, 0, 0]
-    assert ground_view.used == ground_view.dropped.total() == 0
+    assert ground_view.used == ground_view.dropped.total() == len(ground_view.base) == 0
 
 
 def test_the_base_is_where_the_pose_is() -> None:
@@ -335,7 +335,8 @@ def test_the_base_is_where_the_pose_is() -> None:
     mount = np.array([[0, 0, 1, 0.5], [-1, 0, 0, 0.2], [0, -1, 0, 1.0], [0, 0, 0, 1.0]])
     rig = StereoRig(fx=700.0, fy=700.0, cx=640.0, cy=360.0, baseline=0.12, T_base_camera=mount)
     turned = np.array([[0, -1.0, 0, 3], [1, 0, 0, 4], [0, 0, 1, 0], [0, 0, 0, 1]])
-    view = View(T_map_base=turned, rig=rig).with_plane(GroundPlane.below_camera(rig, 1.0))
-    ground_view = flatten(view, OPTIONS)
+    ground = [(640.0, 619.0, 535.0)]  # disparity 21 pixels: 4 m ahead, 1 m below
+    view = View.from_pixels(turned, rig, points_px=ground)
+    ground_view = flatten(view.with_plane(GroundPlane.below_camera(rig, 1.0)), OPTIONS)
     np.testing.assert_allclose(ground_view.base, [(-0.5, -0.2)], atol=1e-12)
     np.testing.assert_allclose(in_map(ground_view, ground_view.base), [(3.0, 4.0)], atol=1e-12)

@@ -17,6 +17,7 @@ from fuzz.draw import Draw
 from fuzz.mutate import damaged, damaged_bytes
 from fuzz.samples import Files
 from groundmap import CellState, ConfidenceGrid, load_map, read_views
+from groundmap.io.align import align
 from groundmap.io.movingai_scen import read_movingai_scen
 from groundmap.simulate import drive
 from planners import PlanningProblem, Roadmap, plan, read_keep_out
@@ -47,6 +48,8 @@ class Reader(Target):
 class Texts(Reader):
     """Text files, of which one is damaged."""
 
+    damage: Callable[[bytes, Draw], bytes] = staticmethod(damaged)
+
     def __init__(
         self,
         name: str,
@@ -67,7 +70,7 @@ class Texts(Reader):
         files = self.whole()
         for _ in range(draw.pick((1, 1, 1, 2))):
             name = draw.pick(sorted(files))
-            files[name] = damaged(files[name], draw)
+            files[name] = self.damage(files[name], draw)
         if len(files) > 1 and draw.chance(0.02):
             del files[draw.pick(sorted(files))]
         return files
@@ -75,6 +78,12 @@ class Texts(Reader):
     def read(self, folder: Path) -> None:
         """Read them."""
         self._read(folder)
+
+
+class Binaries(Texts):
+    """Files of which one is damaged without regard to what its bytes mean."""
+
+    damage = staticmethod(damaged_bytes)
 
 
 class Archives(Reader):
@@ -156,6 +165,19 @@ def _views(folder: Path) -> None:
             raise OutputError("a view with points that are not finite")
 
 
+def _sparse_views(folder: Path) -> None:
+    log = read_views(folder)
+    for view in islice(log, 50):
+        if not np.isfinite(view.points.covariance).all():
+            raise OutputError("a view with covariances that are not finite")
+    align(log)
+
+
+def _guessed_views(folder: Path) -> None:
+    for view in islice(read_views(folder, guess_visibility=True), 50):
+        len(view.points)
+
+
 def _posed_views(folder: Path) -> None:
     for view in read_views(folder, poses=folder / "other.txt"):
         len(view.points)
@@ -187,6 +209,11 @@ FOLDER: Files = {
     "segments.csv": samples.SEGMENTS,
 }
 XYZ: Files = {**FOLDER, "points.csv": samples.POINTS_XYZ, "segments.csv": samples.SEGMENTS_XYZ}
+POSITIONS: Files = {
+    "rig.toml": b'world = "optical"\n',
+    "poses.txt": samples.TUM,
+    "points.csv": b"view,id,x,y,z\n0,1,0.5,1.2,5\n0,2,0.1,1.2,7\n1,1,0.4,1.2,4.5\n2,-1,1,1,6\n",
+}
 ARCHIVED: Files = {"rig.toml": samples.RIG, "poses.txt": samples.TUM}
 
 
@@ -204,6 +231,10 @@ READERS: tuple[Texts | Archives | RosMap, ...] = (
     Texts("folder-xyz", XYZ, _views),
     Texts("poses-gtsam", {**samples.GTSAM, "other.txt": samples.BY_ID}, _posed_views, weight=0.5),
     Texts("poses-folder", {**FOLDER, "other.txt": samples.TUM}, _posed_views, weight=0.5),
+    Texts("folder-positions", POSITIONS, _views),
+    *(Texts(name, files, _sparse_views) for name, files in samples.text_maps().items()),
+    *(Binaries(name, files, _sparse_views) for name, files in samples.binary_maps().items()),
+    Texts("map-guessed", samples.unseen_map(), _guessed_views),
     Archives("folder-npz", "features.npz", samples.tables, _views, beside=ARCHIVED),
     *(
         Archives(

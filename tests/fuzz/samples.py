@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+import sparse_bag
+import sparse_scene
 from groundmap import ConfidenceGrid
 from groundmap.grid.fusion import Capped
 from planners import PlanningProblem, Roadmap
@@ -261,3 +263,46 @@ def _saved(what: Any, path: Path) -> dict[str, Any]:
     what.save(path)
     with np.load(path.with_name(path.name), allow_pickle=False) as archive:
         return {name: archive[name] for name in archive.files}
+
+
+@cache
+def text_maps() -> dict[str, Files]:
+    """Return small maps of SLAM and SfM systems in text, by the name of their target."""
+    scene = sparse_scene.make_scene(views=3, landmarks=15)
+    return {
+        "map-bal": sparse_scene.bal(scene),
+        "map-bundler": sparse_scene.bundler(scene),
+        "map-colmap-text": sparse_scene.colmap_text(scene),
+        "map-meshroom": sparse_scene.meshroom(scene),
+        "map-nvm": sparse_scene.nvm(scene),
+        "map-openmvg-json": sparse_scene.openmvg_json(scene),
+        "map-opensfm": sparse_scene.opensfm(scene),
+        "map-orbslam": sparse_scene.orbslam(scene),
+    }
+
+
+@cache
+def binary_maps() -> dict[str, Files]:
+    """Return small maps of SLAM and SfM systems in binary files, by the name of their target."""
+    scene = sparse_scene.make_scene(views=3, landmarks=15)
+    return {
+        "map-bag-mcap": sparse_bag.files_of(sparse_bag.messages(), "mcap"),
+        "map-bag-ros1": sparse_bag.ros1_file(),
+        "map-bag-sqlite": sparse_bag.files_of(sparse_bag.messages(), "sqlite3"),
+        "map-colmap-binary": sparse_scene.colmap_binary(scene),
+        "map-openmvg-binary": sparse_scene.openmvg_binary(scene),
+        "map-openmvs": sparse_scene.openmvs(scene),
+        "map-rtabmap": sparse_scene.rtabmap(scene),
+        "map-stella-msgpack": sparse_scene.stella_msgpack(scene),
+        "map-stella-sqlite": sparse_scene.stella_sqlite(scene),
+    }
+
+
+def unseen_map() -> Files:
+    """Return a trajectory and points without visibility."""
+    scene = sparse_scene.make_scene(views=3, landmarks=15)
+    lines = [f"{x} {y} {z}\n" for x, y, z in scene.landmarks.tolist()]
+    return {
+        "KeyFrameTrajectory.txt": sparse_scene.tum(scene),
+        "MapPoints.txt": "".join(lines).encode(),
+    }

@@ -35,8 +35,9 @@ def map_file(tmp_path: Path) -> Path:
 
 
 NAMES_IT = (
-    r"^map: expected a box of \d+ cells at most around all tiles, got 1\.00006e\+06 x 128 cells "
-    r"\(500032 x 64 m, 1\.02 GB\)\. 1 of 7 tiles lies far from the rest, the one at "
+    r"^map: expected a box of \d+ cells at most around the observed tiles, "
+    r"got 1\.00006e\+06 x 128 cells \(500032 x 64 m, 1\.02 GB\)\. "
+    r"1 of 7 tiles lies far from the rest, the one at "
     r"\(500016, 16\) m, 499904 m away: is a pose wrong there\? Give the bounds of a part "
     r"\(bounds=\.\.\., --bounds\), without them 0\.0,0\.0,96\.0,64\.0\.$"
 )

@@ -160,7 +160,7 @@ def test_a_window_holds_every_cell_that_its_box_touches(ndim: int, data: st.Data
 
 @given(st.lists(blocks(2), max_size=4))
 @settings(max_examples=30)
-def test_the_window_without_bounds_is_the_box_around_the_touched_tiles(
+def test_the_window_without_bounds_is_the_box_around_the_observed_tiles(
     views: list[Fuse],
 ) -> None:
     grid, twin = built(views, 2)
@@ -187,7 +187,7 @@ def test_the_window_of_the_bounds_misses_nothing_at_any_resolution(
     assert max(window.count.shape) <= 66
 
 
-def test_bounds_are_those_of_the_touched_tiles() -> None:
+def test_bounds_are_those_of_the_observed_tiles() -> None:
     grid = ConfidenceGrid(resolution=0.5, origin=(1.0, 2.0))
     npt.assert_array_equal(grid.bounds(), (1, 2, 1, 2))
     grid.tile((-1, 2))
@@ -377,7 +377,7 @@ def test_views_that_cancel_are_contested_not_unknown() -> None:
     npt.assert_array_equal(states, [[CellState.CONTESTED, CellState.UNKNOWN]])
 
 
-def test_areas_of_the_states_add_up_to_the_touched_tiles() -> None:
+def test_areas_of_the_states_add_up_to_the_observed_tiles() -> None:
     grid = ConfidenceGrid(resolution=0.5)
     grid.fuse(np.array([0, 0]), np.array([[-1, -1, -1, 0.5, 0.001]], dtype=np.float32))
     hole = np.ones((1, 1), np.float32), np.full((1, 1), -0.5, np.float32)
@@ -699,7 +699,7 @@ def test_a_file_with_a_wrong_bit_is_refused_or_loads_the_same(place: int, bit: i
     assert (back.resolution, back.frame, back.rule) == (0.1524, "straße 5", Capped(7))
 
 
-def test_a_tile_is_there_once_it_was_touched() -> None:
+def test_a_tile_exists_once_a_cell_in_it_has_evidence() -> None:
     grid = ConfidenceGrid(resolution=1.0)
     grid.fuse(np.array([-1, 70]), np.full((1, 1), -1.0, dtype=np.float32))
     assert grid.has_tile((-1, 1))

@@ -17,8 +17,7 @@ from groundmap.arrays import Bools, Floats
 from groundmap.grid.grid import ConfidenceGrid
 from planners import AuditError, PlanningProblem
 from planners.audit.audit import audit
-from planners.costmap.kernels.distance import NOWHERE
-from planners.costmap.voxel_map import Voxels
+from planners.costmap.voxel_map import FARTHEST_SQUARED, Voxels
 from planners.geometry.rounding import SLACK
 from planners.problem.problem import Pose
 from planners.sampling.kernels.edges3d import line_clear
@@ -186,7 +185,7 @@ def test_a_ball_passes_a_hole_of_exactly_its_size(radius: float, off: float, pas
 
 def test_states_off_the_map_are_not_clear() -> None:
     validator = validator_over(np.zeros((SIDE,) * 3, dtype=np.bool_), 0.5, unknown="allow")
-    assert (validator.squared == NOWHERE).all()
+    assert (validator.squared == FARTHEST_SQUARED).all()
     width = 0.5 * validator.squared.shape[0]
     inside = 3.0, 3.0, 3.0
     for axis, beyond in product(range(3), (-1e-9, width, math.inf, math.nan)):

@@ -281,12 +281,10 @@ def test_a_world_without_features_fails_with_the_error(tmp_path: Path, level: st
     text = blind.replace("level_ground = true", f"level_ground = {level}")
     outcome = run_scenario(write(tmp_path, text + query() + "[bounds]\nunknown = { max = 1 }\n"))
     assert outcome.passed is False
-    # All that is known is the ground that the robot stood on.
-    [sentence] = outcome.missed
-    assert sentence.startswith("along.outcome is ")
-    recall = outcome.figures["free_recall"]
-    assert isinstance(recall, float)
-    assert recall < 0.1
+    assert outcome.missed == (
+        "InputError: grid: expected at least one known cell, got an empty map.",
+    )
+    assert (outcome.figures, outcome.picture) == ({}, b"")
 
 
 def test_a_missing_map_fails_with_the_error(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import tracemalloc
 from dataclasses import replace
 from typing import Any
 
@@ -18,15 +19,16 @@ from scipy.sparse.csgraph import dijkstra
 
 from groundmap.arrays import Bools, Floats
 from groundmap.grid.grid import ConfidenceGrid
+from groundmap.grid.window import SLAB_CELLS
 from planners import AuditError, CostSettings, PlanningProblem, ProblemError, TimeLimitError
 from planners.audit.audit import audit
 from planners.audit.obstacles import segment_boxes
 from planners.costmap.kernels.distance import NOWHERE, squared_distances_3d
 from planners.costmap.voxel_map import Voxels
-from planners.geometry.kernels.clearance3d import cube_distance, line_clearance
+from planners.geometry.kernels.clearance3d import cube_distance, line_clearance, squared_along
 from planners.search.astar3d import AStar3D
 from planners.search.base import SearchResult, SearchSettings
-from planners.search.kernels.astar3d import COSTS, STEPS, estimate
+from planners.search.kernels.voxel_moves import COSTS, STEPS, around, bits_of, estimate
 from strategies import rngs
 
 RADII = [0.0, 0.4, 0.5, math.sqrt(0.5), math.sqrt(0.75), 1.0]
@@ -139,7 +141,7 @@ def test_unknown_voxels_near_the_start_count_as_free() -> None:
         ),
         (
             {"clear_start_radius": 500.0},
-            "footprint: expected at most 33554432 cells in the box around the map",
+            "footprint: expected at most 134217728 cells in the box around the map",
         ),
     ],
 )
@@ -397,3 +399,57 @@ def test_unknown_voxels_may_be_entered_if_requested() -> None:
     audit(replace(problem, clear_start_radius=4.0), line)
     with pytest.raises(AuditError, match="too close to an unknown cell"):
         audit(problem, line)
+
+
+# Memory
+
+
+def test_a_query_sees_no_label_of_the_queries_before_it() -> None:
+    blocked = np.random.default_rng(3).random((20, 30, 40)) < 0.2
+    problem = posed(blocked, (0.5, 0.5, 0.5), (0.5, 0.5, 0.5), 0.0)
+    used = AStar3D(Voxels.of(problem))
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        start, goal = (tuple(place.tolist()) for place in ends(rng, blocked))
+        answers = [
+            engine.search(start, goal, SearchSettings())
+            for engine in (used, AStar3D(Voxels.of(problem)))
+        ]
+        if answers[0] is None or answers[1] is None:
+            assert answers == [None, None]
+            continue
+        assert answers[0].expanded == answers[1].expanded
+        np.testing.assert_array_equal(answers[0].waypoints, answers[1].waypoints)
+
+
+def test_voxels_are_read_without_a_dense_copy_of_the_map() -> None:
+    grid = cubes(np.zeros((256, 96, 128), dtype=bool))
+    problem = PlanningProblem(grid, start=(1, 1, 1), goal=(9, 9, 9), footprint=0.0)
+    tracemalloc.start()
+    voxels = Voxels.of(problem)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 3 * voxels.blocked.size + 24 * SLAB_CELLS
+
+
+@given(masks(side=11), rngs())
+@settings(max_examples=30)
+def test_bits_around_a_voxel_are_those_of_the_voxels_beside_it(
+    traversable: Bools, rng: np.random.Generator
+) -> None:
+    bits = bits_of(traversable)
+    padded = np.pad(traversable, 1)
+    at = [int(rng.integers(1, side + 1)) for side in traversable.shape]
+    mask = around(bits.ravel(), *bits.strides[:2], *at)
+    beside = padded[tuple(slice(i - 1, i + 2) for i in at)]
+    assert [bool(mask >> k & 1) for k in range(27)] == beside.ravel().tolist()
+
+
+@given(masks(side=9), rngs())
+@settings(max_examples=60)
+def test_squared_distances_along_voxels_are_those_of_the_whole_map(
+    blocked: Bools, rng: np.random.Generator
+) -> None:
+    cells = np.column_stack([rng.integers(0, side, 12) for side in blocked.shape])
+    expected = squared_distances_3d(blocked, NOWHERE)[tuple(cells.T)]
+    np.testing.assert_array_equal(squared_along(blocked, cells, NOWHERE), expected)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -42,7 +44,7 @@ def apart(a: Floats, b: Floats) -> Floats:
     return turn
 
 
-def moved(stops: Stops, seed: int = 1, **options: float) -> Drive:
+def moved(stops: Stops, seed: int = 1, **options: Any) -> Drive:
     return drive(DriveSettings(stops=stops, **options), np.random.default_rng(seed))
 
 
@@ -172,3 +174,26 @@ def test_invalid_poses_are_refused() -> None:
         to_transforms([(0, 0)])
     with pytest.raises(InputError, match=r"^poses: expected finite numbers"):
         to_transforms([(0, 0, np.nan)])
+
+
+def test_a_drive_climbs_pitches_and_rolls_between_its_stops() -> None:
+    settings = DriveSettings(
+        stops=((0, 0, 90), (0, 4, 90)), heights=(0, 2), pitches=(0, -20), rolls=(10, 30), every=3
+    )
+    moves = drive(settings, np.random.default_rng(1))
+    np.testing.assert_array_equal(moves.true, moves.logged)
+    first, middle, last = moves.true
+    assert middle[:3, 3].tolist() == [0.0, 2.0, 1.0]
+    # At the last stop, base_link looks along +y, upwards by 20 degrees, and leans right by 30.
+    cos, sin = np.cos(np.radians(20)), np.sin(np.radians(20))
+    np.testing.assert_allclose(last[:3, 0], (0.0, cos, sin), atol=1e-12)
+    np.testing.assert_allclose(last[2, 1], cos * np.sin(np.radians(30)))  # its left side is higher
+    np.testing.assert_allclose(first[:3, :3] @ first[:3, :3].T, np.eye(3), atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["heights", "pitches", "rolls"])
+def test_another_number_of_heights_or_tilts_than_of_stops_is_refused(name: str) -> None:
+    options: dict[str, Any] = {name: (1.0,)}
+    settings = DriveSettings(stops=((0, 0, 0), (1, 0, 0)), **options)
+    with pytest.raises(InputError, match=f"{name}: expected a number for each of the 2 stops"):
+        drive(settings, np.random.default_rng(1))

@@ -214,3 +214,35 @@ def test_a_world_of_more_landmarks_than_memory_is_refused() -> None:
     ):
         with pytest.raises(InputError, match=r"^world: expected at most 1e\+06 landmarks, got"):
             sample_landmarks(world, np.random.default_rng(1))
+
+
+def test_a_ramp_carries_its_landmarks_on_its_slope_and_below() -> None:
+    ramp = Solid(BLOCK, top=1.5, slope=(0.5, 0.0), texture=40.0, lines=2.0)
+    points, segments = sample_landmarks(
+        World(bounds=BOUNDS, solids=(ramp,), ground_texture=0.0), np.random.default_rng(1)
+    )
+    heights = 0.5 * (points.xyz[:, 0] - 4.0)
+    assert (points.xyz[:, 2] <= heights + HAIR).all()
+    inside = shapely.contains_xy(BLOCK.buffer(-HAIR), points.xyz[:, :2])
+    np.testing.assert_allclose(points.xyz[inside, 2], heights[inside], atol=HAIR)
+    assert inside.sum() == pytest.approx(40.0 * BLOCK.area, rel=0.15)
+    ends = segments.xyz.reshape(-1, 3)
+    assert (ends[:, 2] <= 0.5 * (ends[:, 0] - 4.0) + HAIR).all()
+
+
+def test_an_underside_has_points_and_lower_edges_only_if_it_has_a_texture() -> None:
+    def sampled(underside: float) -> tuple[Floats, Floats]:
+        slab = Solid(BLOCK, bottom=2.0, top=2.1, underside=underside)
+        world = World(bounds=BOUNDS, solids=(slab,), ground_texture=0.0)
+        points, segments = sample_landmarks(world, np.random.default_rng(1))
+        return points.xyz, segments.xyz
+
+    bare, textured = sampled(0.0), sampled(30.0)
+    below = textured[0][textured[0][:, 2] < 2.0]
+    assert len(below) == pytest.approx(30.0 * BLOCK.area, rel=0.15)
+    np.testing.assert_allclose(below[:, 2], 2.0 - OFF)
+    assert shapely.contains_xy(BLOCK, below[:, :2]).all()
+    np.testing.assert_array_equal(textured[0][: len(bare[0])], bare[0])
+    assert not (bare[1][..., 2] < 2.0).any()
+    lower = textured[1][(textured[1][..., 2] < 2.0).all(axis=1)]
+    assert np.linalg.norm(lower[:, 1] - lower[:, 0], axis=1).sum() == pytest.approx(BLOCK.length)

@@ -40,7 +40,7 @@ def random_world(rng: np.random.Generator) -> World:
     return World(bounds=(0, -6, 14, 6), solids=tuple(solids), ground_texture=3.0, ground_lines=0.3)
 
 
-def moves_of(*stops: tuple[float, float, float], **options: float) -> Drive:
+def moves_of(*stops: tuple[float, float, float], **options: Any) -> Drive:
     return drive(DriveSettings(stops=stops, **options), np.random.default_rng(1))
 
 

@@ -27,7 +27,8 @@ def kernel(
     pieces = [edges_of(outline) for outline in outlines]
     starts = np.cumsum([0, *map(len, pieces)], dtype=np.int64)
     out = np.empty(len(targets), dtype=np.bool_)
-    find_hidden(eye, targets, np.concatenate(pieces), starts, np.array(heights), out)
+    level = np.hstack([np.array(heights), np.zeros((len(heights), 2))])
+    find_hidden(eye, targets, np.concatenate(pieces), starts, level, out)
     return out
 
 
@@ -194,3 +195,25 @@ def test_first_hits_are_where_rays_first_meet_an_edge(rng: np.random.Generator, 
         else:
             assert distance == pytest.approx(apart, abs=1e-9)
             assert lines[row].distance(shapely.Point(eye + distance * way)) < 1e-9
+
+
+@settings(max_examples=40)
+@given(rngs())
+def test_a_solid_with_a_slope_hides_what_points_along_sight_are_in_it(
+    rng: np.random.Generator,
+) -> None:
+    slope = rng.uniform(-0.4, 0.4, 2)
+    low = rng.uniform(0.0, 1.0)
+    ramp = Solid(star(rng), bottom=low, top=low + 6.0, slope=(slope[0], slope[1]))
+    eye = np.array([*rng.uniform(-9.0, 9.0, 2), rng.uniform(0.3, 7.0)])
+    assume(not shapely.contains_xy(ramp.outline, *eye[:2]))
+    targets = rng.uniform((-9.0, -9.0, 0.0), (9.0, 9.0, 7.0), (25, 3))
+    found = in_sight(World(bounds=(-9, -9, 9, 9), solids=(ramp,)), eye, targets)
+    for target, answer in zip(targets, found, strict=True):
+        places = eye + np.linspace(0.0, 1.0, 4001)[:, None] * (target - eye)
+        depth = np.minimum(places[:, 2] - low, ramp.top_at(places[:, :2]) - places[:, 2])
+        depth[~shapely.contains_xy(ramp.outline, places[:, :2])] = -1.0
+        if (depth > 0.0).any():
+            assert not answer
+        elif (depth < -0.02).all():
+            assert answer

@@ -178,3 +178,15 @@ def test_obstacles_are_the_union_of_all_outlines(rng: np.random.Generator) -> No
     for xmin, ymin, xmax, ymax in (outline.bounds for outline in outlines):
         expected |= (xmin < x) & (x < xmax) & (ymin < y) & (y < ymax)
     np.testing.assert_array_equal(shapely.contains_xy(found, x, y), expected)
+
+
+def test_the_top_of_a_ramp_is_its_highest_point() -> None:
+    ramp = Solid(shapely.box(2, 0, 6, 1), top=1.0, slope=(-0.25, 0.0), velocity=(1.0, 0.0))
+    places = np.array([(2.0, 0.5), (6.0, 0.5), (4.0, 0.0)])
+    assert ramp.top_at(places).tolist() == [1.0, 0.0, 0.5]
+    assert ramp.at(2.0).top_at(places + np.array([2.0, 0.0])).tolist() == [1.0, 0.0, 0.5]
+
+
+def test_a_slope_to_below_the_bottom_is_refused() -> None:
+    with pytest.raises(InputError, match=r"slope: .* lowest point .* got -0\.2"):
+        Solid(shapely.box(2, 0, 6, 1), top=1.0, slope=(-0.3, 0.0))

@@ -1,1 +1,1 @@
-"""Evidence of a 2-D map, built in the ground plane."""
+"""Evidence for 2-D maps, computed in the ground plane."""

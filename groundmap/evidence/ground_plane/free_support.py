@@ -1,4 +1,4 @@
-"""How far freespace reaches on bearings without a surface: supported by ground features."""
+"""Extent of freespace at bearings without a surface, from ground features."""
 
 from __future__ import annotations
 
@@ -12,24 +12,30 @@ from groundmap.evidence.ground_plane.kernels.lines import SAME_BEARING, gap_chor
 from groundmap.evidence.uncertainty import MODELS
 from groundmap.settings import MapperSettings
 
-USUAL_GAPS = 0.8  # share of the gaps between lines of sight that are no wider than usual
-UNUSUAL = 4.0  # times the usual width: where features are dense, such a gap is empty for a reason
+USUAL_GAPS = 0.8  # quantile of the gaps between lines of sight: the usual width
+UNUSUAL = 4.0  # times the usual width: a wider gap among dense features is not observed
 
 
 class Supports(NamedTuple):
-    """Chords that freespace reaches to where no surface is."""
+    """Chords that bound freespace at bearings without a surface."""
 
     chords: Floats  #: shape (k, 2, 2) [m, view], counter-clockwise
     heights: Floats  #: shape (k, 2) [m], of the lines of sight above the ground at their ends
 
 
 def support_chords(ground_view: GroundView, settings: MapperSettings) -> Supports:
-    """Return the chords that freespace reaches to where no surface is.
+    """Return the chords that bound freespace at bearings without a surface.
 
-    Each ground feature at range r vouches for the bearings within min(support_width / r,
-    support_angle), out to r. Two lines of sight vouch for what is between them as far as both
-    reach and no more than `sight_gap` lies between: nothing wider fits in unseen. Lines to
-    obstacles count as far as before the obstacle, if they come down low enough.
+    A ground feature at range r supports freespace up to r, at bearings within
+    min(support_width / r, support_angle) of its own. Two neighbouring lines of sight support
+    freespace between them, up to the range of the shorter one and where they are at most
+    `widest_gap` apart. Lines of sight to obstacles end before the obstacle; they count if they end
+    below `grant_height` times the height of the camera.
+
+    Parameters
+    ----------
+    ground_view : GroundView
+    settings : MapperSettings
     """
     single = _single_chords(ground_view, settings)
     chords, heights = _gaps(ground_view, settings)
@@ -55,10 +61,10 @@ def _single_chords(ground_view: GroundView, settings: MapperSettings) -> Floats:
 
 
 def _borders(ground_view: GroundView, radius: Floats) -> tuple[Floats, Floats]:
-    """Return between which bearings both images see, at ranges, shape (n,) [rad].
+    """Return the bearings between which both images see, by range, shape (n,) each [rad].
 
-    The left image ends on both sides as far from its axis; the right one, a baseline to the right,
-    ends before it on the left.
+    The borders of the left image are symmetric. The right camera is a baseline to the right, which
+    moves the left border inwards.
     """
     border = np.arctan(ground_view.border)
     blind = np.arcsin(np.minimum(ground_view.baseline * np.cos(border) / radius, 1.0))
@@ -102,10 +108,15 @@ def _by_bearing(bearings: Floats, ranges: Floats) -> tuple[Ints, Floats]:
 
 
 def widest_gap(chords: Floats, settings: MapperSettings) -> float:
-    """Return which gap between lines of sight counts as seen [m].
+    """Return the largest gap between lines of sight that counts as observed [m].
 
-    Four times what the view's features usually leave between neighbouring lines of sight, whose
-    `chords` have the shape (k, 2, 2) [m, view].
+    It is four times the usual gap in the view, bounded by `support_width` and `sight_gap`.
+
+    Parameters
+    ----------
+    chords : ndarray, shape (k, 2, 2) [m, view]
+        Chords between neighbouring lines of sight.
+    settings : MapperSettings
     """
     if len(chords) == 0:
         return settings.sight_gap

@@ -1,8 +1,8 @@
-"""One view seen from above: features by height class, in the view's own ground frame.
+"""Features of one view by height class, projected to the ground frame of the view.
 
-The frame ``view`` has its origin below the left camera, x along the optical axis, y left. All that
-happens to one view (triangulation, sight) happens in this frame, so that the map a view makes does
-not depend on where in the map the view stands; only the last step turns and shifts.
+The frame ``view`` has its origin below the left camera, x along the optical axis, y left. All steps
+for one view (triangulation, visibility) use this frame, and only the last one transforms to the
+map. The evidence of a view is thus independent of its pose.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from groundmap.view.ground_plane import GroundPlane
 from groundmap.view.view import Features, View, sigma_along
 
 UNSURE = 2.0  # standard deviations that must not reach from a feature to the camera
-HOLLOW = 0.02  # [1/m of range], how deep ground may lie below the plane and still be driven on
+HOLLOW = 0.02  # [m per m of range], added to the depth that is traversable
 
 
 class GroundView(NamedTuple):
     """The features of one view in its ground frame, by height class."""
 
     viewpoint: Floats  #: shape (2,) [m, map]
-    base: Floats  #: shape (k, 2) [m, view], where the base stands: 0 or 1 place
+    base: Floats  #: shape (k, 2) [m, view], place of the base; none without features
     forward: Floats  #: shape (2,), unit vector [map]: x of the frame ``view``
     camera_height: float  #: [m] above the ground plane
     border: float  #: tangent of the bearing of the left image's borders
@@ -37,14 +37,14 @@ class GroundView(NamedTuple):
     covariance: Floats  #: shape (n, 2, 2) [m², view]
     heights: Floats  #: shape (n,) [m] above the ground plane
     segments: Ints  #: shape (m, 2), rows of `points`
-    supports: Floats  #: shape (k, 2) [m, view], where the ground itself was seen
+    supports: Floats  #: shape (k, 2) [m, view], ground features
     support_heights: Floats  #: shape (k,) [m]
-    feature: Ints  #: shape (n + k,), which feature of the view each point and support is of
+    feature: Ints  #: shape (n + k,), number in the view of each point's and support's feature
     drop_offs: Floats  #: shape (b, 2) [m, view], features below the ground
     drop_off_heights: Floats  #: shape (b,) [m], below 0
-    drop_off_sureness: Floats  #: shape (b,), 0 to 1, the deeper the surer
-    used: int  #: features that are in any of the above
-    dropped: Counter[str]  #: features that are not, by reason
+    drop_off_sureness: Floats  #: shape (b,), confidence from 0 to 1, increasing with depth
+    used: int  #: number of features in any of the above
+    dropped: Counter[str]  #: number of other features, by reason
 
     def to_map(self, xy: Floats) -> Floats:
         """Return places, shape (..., 2) [m, view], in the map [m, map]."""
@@ -55,18 +55,18 @@ class GroundView(NamedTuple):
 
 
 class _Heights(NamedTuple):
-    """Features with all that the height classes ask for; shapes (n, ...) or (m, 2, ...)."""
+    """Measured features, shapes (n, ...) for points or (m, 2, ...) for segments."""
 
     xy: Floats
     covariance: Floats
     height: Floats
     tolerance: Floats
     radius: Floats  # horizontal distance from the camera [m]
-    sigma: Floats  # standard deviation of the place in its least certain direction [m]
+    sigma: Floats  # standard deviation of the position in its least certain direction [m]
     feature: Ints  # number in the view, points first
 
     def at(self, t: Floats) -> _Heights:
-        """Interpolate along segments: `t`, shape (m, j), 0 at the first end, 1 at the second."""
+        """Interpolate along segments at `t`, shape (m, j): 0 at the first end, 1 at the second."""
 
         def blend(ends: Floats) -> Floats:
             weight = t.reshape(*t.shape, *(1,) * (ends.ndim - 2))
@@ -86,19 +86,25 @@ class _Heights(NamedTuple):
 
 
 def flatten(view: View, settings: MapperSettings, *, number: int | None = None) -> GroundView:
-    """Project a view to its ground plane and sort its features by height.
+    """Return the features of a view, projected to its ground plane and classified by height.
 
-    Ground features lie within max(step_height, 2 sigma_h + r sigma_tilt) of the plane; obstacle
-    features above that, up to the robot's height; higher ones are overhead, lower ones below
-    ground. A segment that leaves the obstacle band is clipped to it. Features of unknown
-    depth are dropped: those within two standard deviations of the camera. `number` is the index of
-    the view in its log, for error messages.
+    Ground features lie within max(step_height, 2 sigma_h + r sigma_tilt) of the plane. Obstacle
+    features lie above, up to the height of the robot. Higher features are overhead, lower ones
+    below ground. Segments are clipped to the obstacle band. Features of unknown
+    depth are dropped: those within two standard deviations of the camera.
+
+    Parameters
+    ----------
+    view : View
+    settings : MapperSettings
+    number : int, optional
+        Index of the view in its log, for error messages.
 
     Raises
     ------
     NoGroundPlaneError
-        The view has no plane, or one that is not below its camera; the camera looks at the ground
-        or the sky.
+        The view has no plane, the plane is not below the camera, or the camera points at the
+        ground or the sky.
     """
     check_plane(view, number=number)
     check_camera(view, number=number)
@@ -118,9 +124,10 @@ def flatten(view: View, settings: MapperSettings, *, number: int | None = None) 
     obstacles, grounds = [part.obstacles for part in parts], [part.ground for part in parts]
     n_points = len(obstacles[0].xy)
     ends = np.arange(n_points, sum(len(part.xy) for part in obstacles), dtype=np.int64)
+    used = sum(part.used for part in parts)
     return GroundView(
         viewpoint=T_map_camera[:2, 3],
-        base=_in_view(view.T_map_base[:2, 3] - T_map_camera[:2, 3], forward)[None],
+        base=_in_view(view.T_map_base[:2, 3] - T_map_camera[:2, 3], forward)[None][: min(used, 1)],
         forward=forward,
         camera_height=float(plane.height(view.rig.T_base_camera[:3, 3])),
         border=view.rig.cx / view.rig.fx if view.rig.cx > 0 else np.inf,
@@ -135,13 +142,13 @@ def flatten(view: View, settings: MapperSettings, *, number: int | None = None) 
         drop_offs=np.concatenate([part.below[:, :2] for part in parts]),
         drop_off_heights=np.concatenate([part.below[:, 2] for part in parts]),
         drop_off_sureness=np.concatenate([part.below[:, 3] for part in parts]),
-        used=sum(part.used for part in parts),
+        used=used,
         dropped=+dropped,
     )
 
 
 def _in_view(offset: Floats, forward: Floats) -> Floats:
-    """Turn a vector of the map, shape (2,) [m], into the frame ``view``."""
+    """Rotate a vector of the map, shape (2,) [m], into the frame ``view``."""
     ahead = forward[0] * offset[0] + forward[1] * offset[1]
     left = forward[0] * offset[1] - forward[1] * offset[0]
     return np.array([ahead, left])
@@ -151,7 +158,7 @@ def _measure(
     features: Features, view: View, plane: GroundPlane, forward: Floats, settings: MapperSettings
 ) -> _Heights:
     rotation = view.T_map_camera[:2, :3]
-    # Sums of products in one fixed order: a quarter turn of the map only swaps the two terms.
+    # The order of the terms keeps results equal under quarter turns of the map.
     axes = np.stack(
         [
             forward[0] * rotation[0] + forward[1] * rotation[1],
@@ -166,7 +173,7 @@ def _measure(
     height += float(plane.height(view.rig.T_base_camera[:3, 3]))
     sigma = sigma_along(up, features.covariance)
     tolerance = np.maximum(settings.step_height, 2.0 * sigma + radius * plane.sigma_tilt)
-    # Both ends of a segment carry its number.
+    # Both ends of a segment get its number.
     number = np.arange(len(features)).reshape(-1, *(1,) * (radius.ndim - 1)) + np.zeros_like(
         radius, dtype=np.int64
     )
@@ -182,7 +189,7 @@ def _measure(
 class _Classes(NamedTuple):
     obstacles: _Heights
     ground: _Heights
-    below: Floats  # shape (b, 4): place, height and sureness
+    below: Floats  # shape (b, 4): position, height and confidence
     used: int
 
 
@@ -219,7 +226,7 @@ def _is_unsure(features: _Heights) -> Bools:
 def _segment_classes(
     segments: _Heights, settings: MapperSettings, dropped: Counter[str]
 ) -> _Classes:
-    """Cut every segment into its obstacle piece and its ground piece, each possibly empty."""
+    """Split segments into an obstacle piece and a ground piece, each of which may be empty."""
     unsure: Bools = np.logical_or.reduce(_is_unsure(segments), axis=1)
     dropped["too_uncertain"] += int(unsure.sum())
     segments = _pick(segments, ~unsure)
@@ -247,10 +254,10 @@ def _segment_classes(
 
 
 def _drop_offs(below: _Heights, settings: MapperSettings) -> Floats:
-    """Return place, height and sureness of features below the ground, shape (b, 4).
+    """Return position, height and confidence of features below the ground, shape (b, 4).
 
-    A plane is off the farther the larger the range, and a hollow of a step's depth is driven
-    through: sureness begins where both are exceeded, and is 1 another step deeper.
+    The error of the plane increases with the range, and hollows of the depth of a step are
+    traversable. The confidence is 0 up to these depths, and reaches 1 a step height deeper.
     """
     allowed = np.maximum(below.tolerance, settings.step_height + HOLLOW * below.radius)
     sureness = np.clip((-below.height - allowed) / settings.step_height, 0.0, 1.0)
@@ -258,7 +265,7 @@ def _drop_offs(below: _Heights, settings: MapperSettings) -> Floats:
 
 
 def _sample_segments(segments: _Heights, spans: Floats, settings: MapperSettings) -> _Heights:
-    """Points along ground segments, dense enough that each vouches up to the next."""
+    """Return points along ground segments, at most `support_width` apart."""
     ends = segments.at(spans)
     length = np.hypot(*(ends.xy[:, 1] - ends.xy[:, 0]).T)
     counts = np.ceil(length / settings.support_width).astype(np.int64) + 1

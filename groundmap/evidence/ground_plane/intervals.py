@@ -1,4 +1,4 @@
-"""Parts of segments: intervals [t0, t1] of 0..1, empty where t0 > t1; one per segment."""
+"""Parts of segments: one interval [t0, t1] within 0..1 per segment, empty if t0 > t1."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from groundmap.arrays import Bools, Floats
 
-NOWHERE = (2.0, -1.0)  # an empty interval that stays empty whatever it is cut with
+NOWHERE = (2.0, -1.0)  # an empty interval; its intersection with any other is empty
 
 
 class Intervals(NamedTuple):
@@ -19,16 +19,21 @@ class Intervals(NamedTuple):
 
     @property
     def any(self) -> Bools:
-        """Which of them hold anything, be it a single place."""
+        """Which intervals are not empty."""
         return self.start <= self.stop
 
     def cut(self, other: Intervals) -> Intervals:
-        """Return what is in both."""
+        """Return the intersection with other intervals."""
         return Intervals(np.maximum(self.start, other.start), np.minimum(self.stop, other.stop))
 
 
 def where_positive(at_start: Floats, at_end: Floats) -> Intervals:
-    """Return where a linear function is not negative, given its values at both ends.
+    """Return where linear functions along segments are not negative.
+
+    Parameters
+    ----------
+    at_start, at_end : ndarray, shape (n,)
+        Values at both ends.
 
     Examples
     --------
@@ -64,7 +69,7 @@ def inside_circle(start: Floats, end: Floats, radius: float) -> Intervals:
     root = np.sqrt(np.maximum(discriminant, 0.0))
     scale = np.where(a == 0.0, 1.0, a)
     t0, t1 = np.maximum((-b - root) / scale, 0.0), np.minimum((-b + root) / scale, 1.0)
-    # A segment without length is inside as a whole, or not at all.
+    # A segment of zero length is inside entirely or not at all.
     outside = np.where(a == 0.0, c > 0.0, discriminant < 0.0)
     t0, t1 = np.where(a == 0.0, 0.0, t0), np.where(a == 0.0, 1.0, t1)
     return Intervals(np.where(outside, NOWHERE[0], t0), np.where(outside, NOWHERE[1], t1))

@@ -1,4 +1,4 @@
-"""Places without ground, below which lines of sight pass."""
+"""Places without ground, detected by lines of sight to features below the ground."""
 
 from __future__ import annotations
 
@@ -6,20 +6,28 @@ import numpy as np
 
 from groundmap.arrays import Bools, Floats, Ints
 from groundmap.evidence.ground_plane.height_classes import GroundView
-from groundmap.evidence.ground_plane.kernels.lines import (
-    features_beside,
-)
+from groundmap.evidence.ground_plane.kernels.lines import features_beside
 
-DEEPEST_SIGHT = 3.0  # [m], along the ground: longer lines below it are mostly false matches
-BESIDE = 0.15  # [m], a ground feature this near to a line of sight is beside it
+DEEPEST_SIGHT = 3.0  # [m], along the ground; features that lie deeper are mostly false matches
+BESIDE = 0.15  # [m], distance up to which a ground feature is beside a line of sight
 
 
 def missing_ground(ground_view: GroundView, step: float) -> tuple[Floats, Ints]:
-    """Return places, `step` [m] apart, that lines of sight to features below the ground pass over.
+    """Return the places where lines of sight to drop-offs run below ground level.
 
-    From where they go below the ground's level up to the feature, shape (n, 2) [m, view], and
-    which of the `drop_offs` each belongs to, shape (n,). A line that ground features lie beside
-    there is that of a false match, and is left out.
+    A line of sight with ground features beside this part belongs to a false match, and is left out.
+
+    Parameters
+    ----------
+    ground_view : GroundView
+    step : float [m]
+        Largest distance between places.
+
+    Returns
+    -------
+    places : ndarray, shape (n, 2) [m, view]
+    line : ndarray of int, shape (n,)
+        Row of `drop_offs` of each place.
     """
     range_at_end = np.hypot(ground_view.drop_offs[:, 0], ground_view.drop_offs[:, 1])
     entry = ground_view.camera_height / (ground_view.camera_height - ground_view.drop_off_heights)
@@ -34,7 +42,7 @@ def missing_ground(ground_view: GroundView, step: float) -> tuple[Floats, Ints]:
 
 
 def _beside_ground(ground_view: GroundView, rows: Ints, entry: Floats) -> Bools:
-    """Return which of these drop-offs' lines have ground beside them beyond `entry` [m]."""
+    """Return which lines of sight to drop-offs have ground beside them beyond `entry` [m]."""
     ends = ground_view.drop_offs[rows]
     rays = ends / np.hypot(ends[:, 0], ends[:, 1])[:, None]
     end = (rays * ends).sum(axis=1)

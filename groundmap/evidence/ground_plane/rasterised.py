@@ -1,4 +1,4 @@
-"""Surfaces and freespace of one view, drawn into cells: non-free wins over free."""
+"""Evidence of one view: its surfaces and freespace, drawn into cells."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from groundmap.grid.grid import ConfidenceGrid
 from groundmap.printable import format_value
 from groundmap.settings import MapperSettings
 
-MARGIN = 1  # [cells] around what is drawn, so that rounding can't push a border cell outside
-LOW_SIGHT = 4.0  # [step_height]: sight that passes higher says the least about the ground
-LEAST_SURE = 0.25  # -z under high sight
-CONFIRMED = 0.5  # [m], a lone feature below the ground is most likely a false match
-MOST_CELLS = 2**26  # a block of 256 MiB: more is a resolution in the wrong unit
+MARGIN = 1  # [cells] around the drawn shapes, for rounding
+LOW_SIGHT = 4.0  # [step heights], lines of sight from this height up give the least evidence
+LEAST_SURE = 0.25  # -z below high lines of sight
+CONFIRMED = 0.5  # [m], a drop-off without another within this is most likely a false match
+MOST_CELLS = 2**26  # a block of 256 MiB; larger ones are due to a resolution in another unit
 
 
 def evidence_of(
@@ -37,18 +37,26 @@ def evidence_of(
     grid: ConfidenceGrid,
     settings: MapperSettings,
 ) -> Evidence:
-    """Draw surfaces and freespace of a view into cells.
+    """Return the evidence of a view: its surfaces and freespace, drawn into cells.
 
-    Freespace is below 0 in the fan: -1 where sight touches the ground, and the nearer to 0 the
-    higher the lowest line of sight passes. Surfaces are above 0, spread by the uncertainty model
-    up to `max_range`. Where the base stands the ground is free, as wide as the narrowest footprint.
-    Where both fall into a cell the surface wins: letting the last ray win erases walls. Where
-    ground is missing, a cell is non-free, too.
+    Cells in the fan are free: -1 where a line of sight reaches the ground, closer to 0 the higher
+    the lowest line of sight passes. Cells below the base are free within the narrowest footprint.
+    Surfaces are above 0, spread by the uncertainty model up to `max_range`, and override free
+    cells. Cells with missing ground are non-free, too.
+
+    Parameters
+    ----------
+    ground_view : GroundView
+    surfaces : Surfaces
+    fan : SightFan
+    grid : ConfidenceGrid
+        Grid that defines the cells.
+    settings : MapperSettings
 
     Raises
     ------
     InputError
-        The view reaches over more than 2**26 cells.
+        The view spans more than 2**26 cells, or is too far from the origin.
     """
     model = MODELS[settings.uncertainty]
     to_cells = _CellsOf(ground_view, grid)
@@ -135,7 +143,7 @@ def _within(places: Floats, farthest: float) -> Floats:
 def _draw_sight(
     height: Floats32, lower: Floats, ground_view: GroundView, fan: SightFan, to_cells: _CellsOf
 ) -> None:
-    """Lower the cells' heights to the lines of sight that end on the ground or on a surface."""
+    """Lower the heights of cells to the lines of sight that end on the ground or a surface."""
     walls = fan.surface != NO_SURFACE
     ends = np.concatenate([fan.supports.chords, fan.ends[walls]])
     heights = np.concatenate([fan.supports.heights, fan.bottoms[walls]])
@@ -144,11 +152,18 @@ def _draw_sight(
 
 
 def with_drop_offs(evidence: Evidence, ground_view: GroundView, grid: ConfidenceGrid) -> Evidence:
-    """Return the evidence of a view with what its features below the ground say.
+    """Return the evidence of a view with its drop-offs added.
 
-    Ground is missing under such features, and where their lines of sight pass between the
-    ground's level and the feature: had there been ground, it would have been in the way. There, z
-    is raised to how sure they are.
+    Ground is missing at features below the ground, and where their lines of sight run below ground
+    level, as ground would block them. The z of these cells is raised to the confidence of the
+    drop-off.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    ground_view : GroundView
+    grid : ConfidenceGrid
+        Grid that defines the cells.
     """
     deep = (ground_view.drop_off_sureness > 0) & ~_alone(ground_view.drop_offs)
     if not deep.any():
@@ -162,8 +177,8 @@ def with_drop_offs(evidence: Evidence, ground_view: GroundView, grid: Confidence
     number = np.concatenate([np.arange(len(ground_view.drop_offs)), line])
     places = np.concatenate([ground_view.drop_offs, passed])
     cells = np.floor(_CellsOf(ground_view, grid)(places) + EDGE).astype(np.int64)[:, ::-1]
-    lower, z, height = _grown(evidence, cells.min(axis=0), cells.max(axis=0) + 1)
-    # From the least sure to the surest, and of equally sure ones the least deep last.
+    lower, z, height = _extend(evidence, cells.min(axis=0), cells.max(axis=0) + 1)
+    # In ascending confidence; at equal confidence the least deep comes last.
     order = np.lexsort(
         [ground_view.drop_off_heights[number], ground_view.drop_off_sureness[number]]
     )
@@ -181,14 +196,14 @@ def with_drop_offs(evidence: Evidence, ground_view: GroundView, grid: Confidence
 
 
 def _alone(places: Floats) -> Bools:
-    """Return which places, shape (n, 2) [m], have no other within `CONFIRMED`."""
+    """Return which places, shape (n, 2) [m], have no other place within `CONFIRMED`."""
     apart = np.hypot(*np.moveaxis(places[:, None] - places[None], -1, 0))
     alone: Bools = (apart <= CONFIRMED).sum(axis=1) == 1
     return alone
 
 
-def _grown(evidence: Evidence, lower: Ints, upper: Ints) -> Evidence:
-    """Return the evidence as a block that holds the cells from `lower` up to `upper`, too."""
+def _extend(evidence: Evidence, lower: Ints, upper: Ints) -> Evidence:
+    """Return the evidence, its block extended to the cells from `lower` up to `upper`."""
     before = np.maximum(evidence.lower - lower, 0)
     after = np.maximum(upper - evidence.lower - evidence.z.shape, 0)
     margins = list(zip(before.tolist(), after.tolist(), strict=True))
@@ -197,7 +212,7 @@ def _grown(evidence: Evidence, lower: Ints, upper: Ints) -> Evidence:
 
 
 class _CellsOf:
-    """From the frame ``view`` to cells (x along columns), unrounded."""
+    """Transform from the frame ``view`` to fractional cells, x along columns."""
 
     def __init__(self, ground_view: GroundView, grid: ConfidenceGrid) -> None:
         self.ground_view, self.grid = ground_view, grid

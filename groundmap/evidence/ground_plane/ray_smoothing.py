@@ -1,7 +1,7 @@
-"""Smoothing: features that may lie on one surface tell each other where it is.
+"""Smoothing of features that may lie on one surface.
 
-Each feature's range is as noisy as its disparity, and the nearest of many noisy features bounds
-what is seen: a wall would come the nearer, the more features it has.
+The range of a feature is as noisy as its disparity, and the nearest feature of a surface bounds
+freespace. Without smoothing, walls with more features would appear nearer.
 """
 
 from __future__ import annotations
@@ -12,18 +12,23 @@ from groundmap.evidence.ground_plane.height_classes import GroundView
 from groundmap.evidence.ground_plane.kernels.smooth import smooth_along_rays
 from groundmap.settings import MapperSettings
 
-GATE = 2.0  # standard deviations of the difference: what is farther apart is two surfaces
-SUREST = 0.5  # of its own standard deviation: a real surface is not quite straight
+GATE = 2.0  # standard deviations of the difference, between features of one surface
+SUREST = 0.5  # least ratio of new to old standard deviation, as surfaces are not exactly straight
 LEAST_SIGMA = 1e-9  # [1/m]
 
 
 def smooth_features(ground_view: GroundView, settings: MapperSettings) -> GroundView:
-    """Move obstacle features along their lines of sight to where their neighbours agree.
+    """Return the view with obstacle features smoothed along their lines of sight.
 
-    Around each feature a straight surface is fitted to those within `smoothing` metres across the
-    line of sight and two standard deviations along it; alone or in pairs, features stay where
-    they are. Their covariance shrinks accordingly, to a quarter at most. Ground features are left
-    alone.
+    Around each feature, a straight surface is fitted to the features within `smoothing` metres
+    across the line of sight and two standard deviations along it. Groups of fewer than three
+    features do not move. The covariance shrinks accordingly, at most to a quarter. Ground features
+    do not change.
+
+    Parameters
+    ----------
+    ground_view : GroundView
+    settings : MapperSettings
     """
     radius = np.hypot(ground_view.points[:, 0], ground_view.points[:, 1])
     bearings = np.arctan2(ground_view.points[:, 1], ground_view.points[:, 0])
@@ -45,7 +50,7 @@ def smooth_features(ground_view: GroundView, settings: MapperSettings) -> Ground
         deviation,
     )
     stretch, shrink = np.ones(len(radius)), np.ones(len(radius))
-    stretch[order] = 1.0 / (inverse * radius[order])  # new range / old one
+    stretch[order] = 1.0 / (inverse * radius[order])  # ratio of the new range to the old
     shrink[order] = np.clip(deviation / sigma, SUREST, 1.0)
     return ground_view._replace(
         points=ground_view.points * stretch[:, None],

@@ -1,4 +1,4 @@
-"""Surfaces that features are seen through, and how far they are still believed."""
+"""Surfaces that are contradicted by features behind them, and their confidence."""
 
 from __future__ import annotations
 
@@ -8,15 +8,13 @@ import numpy as np
 
 from groundmap.arrays import Bools, Floats
 from groundmap.evidence.ground_plane.height_classes import GroundView
-from groundmap.evidence.ground_plane.kernels.lines import (
-    count_contradicting,
-)
+from groundmap.evidence.ground_plane.kernels.lines import count_contradicting
 from groundmap.evidence.ground_plane.surfaces import SurfaceKind, Surfaces
 
-BELOW = 0.05  # [m], sight that passes this little below a top may have passed over it
-BEHIND = 0.05  # [m], a feature this little behind a surface is on it
-THIN = 0.02  # [m], half-width of the thinnest pole: beside it, one sees past a lone point
-# How many features make up a surface; if more are seen through it, it hides nothing.
+BELOW = 0.05  # [m], depth below a top up to which a line of sight may have passed over it
+BEHIND = 0.05  # [m], distance behind a surface up to which a feature is on it
+THIN = 0.02  # [m], half-width of the thinnest pole, by which a lone point blocks sight
+# Number of features of a surface; if more contradict it, it does not end sight.
 MADE_OF = {
     SurfaceKind.SEGMENT: 2.0,
     SurfaceKind.LINK: 2.0,
@@ -26,25 +24,30 @@ MADE_OF = {
 
 
 class Contradictions(NamedTuple):
-    """Surfaces against the features that are seen through them."""
+    """Features seen through surfaces, and the resulting confidence in the surfaces."""
 
-    against: Floats  #: shape (s,), features behind it that are seen below its top
-    belief: Floats  #: shape (s,), 1, or for an outnumbered surface the share of those who make it
-    features: int  #: that are seen through any surface
+    against: Floats  #: shape (s,), number of features behind it that are seen below its top
+    belief: Floats  #: shape (s,), 1, or the share of the surface's own features if outnumbered
+    features: int  #: number of features seen through any surface
 
     @property
     def hiding(self) -> Bools:
-        """Which surfaces hide what is behind them, shape (s,): those that are not outnumbered."""
+        """Which surfaces end lines of sight, shape (s,)."""
         hiding: Bools = self.belief == 1.0
         return hiding
 
 
 def contradictions(ground_view: GroundView, surfaces: Surfaces) -> Contradictions:
-    """Count, for each surface, the features that are seen through it.
+    """Return, for each surface, the number of features seen through it.
 
-    A feature that is seen *over* a surface is behind it, as it should be; one whose line of sight
-    passes below its top contradicts it. A surface that more features contradict than make it up
-    is most likely the ghost of a false match.
+    A feature behind a surface contradicts it if its line of sight passes below the top of the
+    surface. A surface that is contradicted by more features than it consists of is most likely due
+    to a false match.
+
+    Parameters
+    ----------
+    ground_view : GroundView
+    surfaces : Surfaces
     """
     points = np.concatenate([ground_view.points, ground_view.supports])
     heights = np.concatenate([ground_view.heights, ground_view.support_heights])
@@ -83,7 +86,7 @@ def contradictions(ground_view: GroundView, surfaces: Surfaces) -> Contradiction
 
 
 def _solid_ends(surfaces: Surfaces) -> Floats:
-    """Return the ends of surfaces, a lone point's as near to it as the thinnest pole's."""
+    """Return the ends of surfaces; lone points are at most as wide as the thinnest pole."""
     middle = surfaces.ends.mean(axis=1, keepdims=True)
     lone = surfaces.discs > 0
     share = np.where(lone, np.minimum(THIN / np.where(lone, surfaces.discs, 1.0), 1.0), 1.0)

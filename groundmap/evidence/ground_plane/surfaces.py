@@ -1,4 +1,4 @@
-"""What bounds freespace in one view: segments, believed links, and the discs of lone points."""
+"""Surfaces that bound freespace in one view: segments, links and discs of lone points."""
 
 from __future__ import annotations
 
@@ -15,46 +15,46 @@ from groundmap.evidence.triangulation import Mesh
 from groundmap.evidence.uncertainty import MODELS
 from groundmap.settings import MapperSettings
 
-RADIAL = 1e-9  # [rad], an edge that spans less is seen end-on
-FRONTIER = 255  # the kind of an edge that is no surface
-JUST_BEHIND = 1e-6  # of its range: how far a doubtful place lies behind what makes it so
-SHARE_OF_FOOTPRINT = 0.8  # a link shorter than this share of the narrowest robot stops that robot
+RADIAL = 1e-9  # [rad], an edge with a smaller angle is seen end-on
+FRONTIER = 255  # kind of edges that are not surfaces
+JUST_BEHIND = 1e-6  # share of its range by which a possible continuation lies behind its feature
+SHARE_OF_FOOTPRINT = 0.8  # largest length of a link, as a share of the narrowest footprint
 
 
 class SurfaceKind(IntEnum):
-    """Why something is a surface."""
+    """Origin of a surface."""
 
     SEGMENT = 0
     LINK = 1
     LONE = 2
-    DOUBTFUL = 3  #: a link too long to believe, but not by far, or where a surface may go on
+    DOUBTFUL = 3  #: a link of up to `doubt` times the length limit, or a possible continuation
 
 
 class Surfaces(NamedTuple):
     """Surfaces of one view, each a straight piece; shape (s, ...)."""
 
     ends: Floats  #: shape (s, 2, 2) [m, view], counter-clockwise around the viewpoint
-    cores: Floats  #: shape (s, 2, 2) [m, view], what spreads: the same, or a lone point's core
-    reach: Floats  #: shape (s, 2) [m], how far freespace ends before it
+    cores: Floats  #: shape (s, 2, 2) [m, view], origin of the spread: ends, or a lone point's core
+    reach: Floats  #: shape (s, 2) [m], distance from the surface at which freespace ends
     bottoms: Floats  #: shape (s, 2) [m] above the ground
     tops: Floats  #: shape (s, 2) [m] above the ground
     kind: Bytes  #: shape (s,), `SurfaceKind`
     discs: Floats  #: shape (s,) [m], radius of a lone point's disc; 0 for the others
-    frontiers: Floats  #: shape (f, 2, 2) [m, view], links too long to believe
-    through_viewpoint: int  #: edges and lone points dropped because they lie within `min_range`
+    frontiers: Floats  #: shape (f, 2, 2) [m, view], edges that are neither segments nor links
+    through_viewpoint: int  #: number of edges and lone points dropped within `min_range`
 
 
 class _Vertices(NamedTuple):
-    """Mesh vertices, or places on edges, with what is known of them; shape (n, ...)."""
+    """Mesh vertices or points on edges, with heights and uncertainty; shape (n, ...)."""
 
     xy: Floats
     low: Floats
     high: Floats
-    sigma: Floats  # [m], as the uncertainty model has it
+    sigma: Floats  # [m], by the uncertainty model
 
 
 class _Pieces(NamedTuple):
-    """Pieces of edges: vertex numbers, shape (k, 2), and where on the edge, 0 to 1."""
+    """Pieces of edges: vertex numbers, shape (k, 2), and interval on the edge, 0 to 1."""
 
     edges: Ints
     span: Floats
@@ -73,16 +73,24 @@ class _Pieces(NamedTuple):
 
 
 def find_surfaces(ground_view: GroundView, mesh: Mesh, settings: MapperSettings) -> Surfaces:
-    """Tell which edges of the triangulation are surfaces.
+    """Return the surfaces among the edges of the triangulation.
 
-    Segments are. Links between neighbouring features are, up to a length of
-    min(max(link_length, link_angle r), 0.8 narrowest_footprint), r the range of the nearer end, if
-    the features' height bands overlap. A vertex with neither is a disc of max(cell / 2, sigma), but
-    not larger than such a link is long.
-    All other edges are frontiers: they grant nothing, and bound nothing unless they are doubtful,
-    which they are up to `doubt` times the length that would be believed. Doubtful, too, is the
-    place beside a feature: what it is on may go on there. What is doubtful ends sight unless
-    features are seen through it, and is not drawn.
+    Segments are surfaces. Links between neighbouring features are surfaces up to a length of
+    min(max(link_length, link_angle r), 0.8 narrowest_footprint), with r the range of the nearer
+    end, if the height bands of the features overlap. A lone point (a vertex without surface) is a
+    disc with the radius max(cell / 2, sigma), but not larger than the length limit of a link.
+
+    Links up to `doubt` times longer than the limit are doubtful, as is the space within `halo`
+    beside a feature, into which its surface may continue. Doubtful surfaces end lines of sight
+    unless features are seen through them, grant no freespace, and are not drawn. All other edges
+    have no effect.
+
+    Parameters
+    ----------
+    ground_view : GroundView
+    mesh : Mesh
+        Triangulation of the points and segments of the view.
+    settings : MapperSettings
     """
     vertices = _vertices(ground_view, mesh, settings)
     kinds = _kinds(vertices, mesh, settings)
@@ -98,7 +106,7 @@ def find_surfaces(ground_view: GroundView, mesh: Mesh, settings: MapperSettings)
     blocked += int((lone & near).sum())
     drawn = kinds < SurfaceKind.DOUBTFUL
     discs = _discs(vertices, lone & ~near, _Vertices(*(values[drawn] for values in ends)))
-    # However unsure a point is, its disc hides no more than a link to a neighbour would.
+    # A disc hides at most as much as a link to a neighbour would.
     bound = _longest_link(np.hypot(discs.xy[:, 0], discs.xy[:, 1]), settings)
     radius = np.maximum(0.5 * settings.resolution, np.minimum(discs.sigma, bound))
     beside = _beside(vertices, ~near & (settings.halo > 0), settings)
@@ -108,7 +116,7 @@ def find_surfaces(ground_view: GroundView, mesh: Mesh, settings: MapperSettings)
     core = np.full(len(radius), MODELS[settings.uncertainty].core_radius(settings.resolution))
     cores = np.concatenate([ends.xy, _silhouettes(discs.xy, core)])
     sigma = np.concatenate([ends.sigma, _twice(discs.sigma)])
-    # No surface spreads farther than features are used, whatever sigma is.
+    # The range of features bounds the spread, which a large sigma would exceed.
     reach = np.minimum(settings.spread_sigmas * sigma, settings.max_range)
     bottoms = np.concatenate([ends.low, _twice(discs.low)])
     tops = np.concatenate([ends.high, _twice(discs.high)])
@@ -130,10 +138,10 @@ def find_surfaces(ground_view: GroundView, mesh: Mesh, settings: MapperSettings)
 
 
 def _vertices(ground_view: GroundView, mesh: Mesh, settings: MapperSettings) -> _Vertices:
-    """Carry the features' heights and covariances over to the mesh's vertices.
+    """Return the vertices of the mesh with the heights and covariances of their features.
 
-    A vertex of several features takes the band that spans them, and the widest covariance; one
-    where segments cross takes what they have there.
+    A vertex of several features gets the height band that spans them and the largest covariance. A
+    crossing gets the values of the segments at this point.
     """
     count = len(mesh.points)
     low, high = np.full(count, np.inf), np.full(count, -np.inf)
@@ -163,7 +171,7 @@ def _kinds(vertices: _Vertices, mesh: Mesh, settings: MapperSettings) -> Bytes:
 
 
 def _longest_link(radius: Floats, settings: MapperSettings) -> Floats:
-    """Return how long a link may be to be believed [m], at a distance from the viewpoint [m]."""
+    """Return the length limit of links [m] by distance from the viewpoint [m]."""
     longest: Floats = np.minimum(
         np.maximum(settings.link_length, settings.link_angle * radius),
         SHARE_OF_FOOTPRINT * settings.narrowest_footprint,
@@ -174,9 +182,9 @@ def _longest_link(radius: Floats, settings: MapperSettings) -> Floats:
 def _away_from_viewpoint(
     xy: Floats, edges: Ints, kinds: Bytes, min_range: float
 ) -> tuple[_Pieces, Bytes, int]:
-    """Clip edges to the outside of the circle of `min_range`; count the firm ones inside."""
+    """Clip edges to the outside of the circle of `min_range`; count the firm edges inside."""
     inside = inside_circle(xy[edges[:, 0]], xy[edges[:, 1]], min_range)
-    whole = inside.start >= inside.stop  # a circle that is only touched cuts nothing off
+    whole = inside.start >= inside.stop  # a tangent circle does not clip the edge
     before, after = ~whole & (inside.start > 0), ~whole & (inside.stop < 1)
     zero, one = np.zeros(len(edges)), np.ones(len(edges))
     spans = ((whole, zero, one), (before, zero, inside.start), (after, inside.stop, one))
@@ -188,9 +196,9 @@ def _away_from_viewpoint(
 
 
 def _beside(vertices: _Vertices, which: Bools, settings: MapperSettings) -> _Vertices:
-    """Return where what a feature is on may go on: to both sides, across the line of sight.
+    """Return the possible continuations of surfaces, to both sides across the line of sight.
 
-    Just behind the feature: the disc of a lone point lies there too, and is to be in front.
+    They lie just behind their feature, and thus behind the disc of a lone point.
     """
     some = _Vertices(*(values[which] for values in vertices))
     half = np.full(len(some.xy), settings.halo)
@@ -203,7 +211,7 @@ def _beside(vertices: _Vertices, which: Bools, settings: MapperSettings) -> _Ver
 def _discs(vertices: _Vertices, lone: Bools, ends: _Vertices) -> _Vertices:
     """Return the lone vertices, and the nearer ends of edges that are seen end-on.
 
-    Seen end-on, an edge covers no bearing, so it counts by its nearer end.
+    An edge seen end-on covers no bearing, so its nearer end replaces it.
     """
     first, last = ends.xy[:, 0], ends.xy[:, 1]
     angle = np.arctan2(np.abs(_cross(first, last)), (first * last).sum(axis=1))
@@ -218,7 +226,7 @@ def _discs(vertices: _Vertices, lone: Bools, ends: _Vertices) -> _Vertices:
 
 
 def _silhouettes(xy: Floats, radius: Floats) -> Floats:
-    """Return what a disc hides, shape (n, 2, 2): its diameter across the line of sight."""
+    """Return the diameters of discs across the line of sight, shape (n, 2, 2)."""
     ray = xy / np.hypot(xy[:, 0], xy[:, 1])[:, None]
     side = np.stack([-ray[:, 1], ray[:, 0]], axis=1) * radius[:, None]
     return np.stack([xy - side, xy + side], axis=1)

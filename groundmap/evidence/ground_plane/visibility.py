@@ -1,4 +1,4 @@
-"""What one view sees at ground level: the fan of triangles that partitions visible freespace."""
+"""Visible freespace of one view at ground level, as a fan of triangles."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ NO_SURFACE = -1
 
 
 class SightFan(NamedTuple):
-    """Triangles (viewpoint, start, end) in the order of bearings, relative to the optical axis."""
+    """Triangles (viewpoint, start, end), ordered by bearing relative to the optical axis."""
 
-    bearings: Floats  #: shape (k, 2) [rad, view], ascending, in -pi..pi: the seam is behind
-    ends: Floats  #: shape (k, 2, 2) [m, view], where sight ends
-    surface: Ints  #: shape (k,), row of the surfaces; -1 where ground support ends it
-    free: Floats  #: shape (k, 2, 2) [m, view], where freespace ends: a reach before the surface
-    bottoms: Floats  #: shape (k, 2) [m], how low sight comes at the ends on surfaces; else 0
-    joined: Bools  #: shape (k,), the next triangle (after the last the first) begins where it ends
+    bearings: Floats  #: shape (k, 2) [rad, view], ascending, in -pi..pi; the seam is behind
+    ends: Floats  #: shape (k, 2, 2) [m, view], ends of sight
+    surface: Ints  #: shape (k,), row of the surface at the end; -1 for ground support
+    free: Floats  #: shape (k, 2, 2) [m, view], ends of freespace, the reach before the surface
+    bottoms: Floats  #: shape (k, 2) [m], bottom of the surface at the ends; 0 for ground support
+    joined: Bools  #: shape (k,), whether the next triangle (cyclic) begins at its end
     contradictions: Contradictions  #: surfaces that features are seen through
-    supports: Supports  #: chords that sight reaches to at ground level
+    supports: Supports  #: chords that bound sight at ground level
 
     @property
     def area(self) -> float:
@@ -43,10 +43,10 @@ class _Edges(NamedTuple):
     a: Floats
     b: Floats
     ends: Floats
-    row: Ints  # of the edges given: those across the seam are two here
+    row: Ints  # row of the input; an edge across the seam has two entries
 
     def at(self, bearings: Floats, number: Ints) -> Floats:
-        """Return the points of edges at bearings; exact where a bearing is an edge's end."""
+        """Return the points of edges at bearings; exact at the ends of edges."""
         cos, sin = np.cos(bearings), np.sin(bearings)
         radius = 1.0 / (self.a[number] * cos + self.b[number] * sin)
         points = np.stack([radius * cos, radius * sin], axis=-1)
@@ -59,12 +59,18 @@ class _Edges(NamedTuple):
 def visible_freespace(
     ground_view: GroundView, surfaces: Surfaces, settings: MapperSettings
 ) -> SightFan:
-    """Sweep the bearings: the nearest surface ends sight; where there is none, ground support.
+    """Return the freespace up to the nearest surface, or up to the ground support.
 
-    Surfaces that more features are seen through than make them up hide nothing. One that is seen
-    by high lines of sight alone ends sight, but does not say that the ground before it is free:
-    there, too, freespace reaches as far as ground support (`support_chords`). Bearings with
+    Contradicted surfaces (`Contradictions.hiding`) are ignored. A doubtful surface, or one whose
+    bottom is above `grant_height`, ends sight but grants no freespace: there, and at bearings
+    without a surface, freespace reaches to the ground support (`support_chords`). Bearings with
     neither are not in the fan.
+
+    Parameters
+    ----------
+    ground_view : GroundView
+    surfaces : Surfaces
+    settings : MapperSettings
     """
     doubts = contradictions(ground_view, surfaces)
     hiding = np.flatnonzero(doubts.hiding)
@@ -103,7 +109,7 @@ def visible_freespace(
 
 
 def _by_bearing(ends: Floats) -> _Edges:
-    """Sort edges, counter-clockwise ones, by bearing; those across the seam become two."""
+    """Sort counter-clockwise edges by bearing; edges across the seam are split."""
     start, end = ends[:, 0], ends[:, 1]
     t0, t1 = np.arctan2(start[:, 1], start[:, 0]), np.arctan2(end[:, 1], end[:, 0])
     t1 = np.where((t1 == -np.pi) & (t0 > 0), np.pi, t1)
@@ -141,7 +147,7 @@ def _by_bearing(ends: Floats) -> _Edges:
 
 
 def _before_surfaces(ends: Floats, surface: Ints, surfaces: Surfaces) -> tuple[Floats, Floats]:
-    """Pull the ends of sight towards the viewpoint by the surfaces' reach; their bottoms, too."""
+    """Return the ends of sight moved towards the viewpoint by the reach, and the bottoms there."""
     free, bottoms = ends.copy(), np.zeros(ends.shape[:2])
     rows = np.flatnonzero(surface != NO_SURFACE)
     first, last = surfaces.ends[surface[rows], 0], surfaces.ends[surface[rows], 1]

@@ -1,4 +1,4 @@
-"""Running averages over flat arrays: the innermost loop of every map."""
+"""Running averages over flat arrays."""
 
 from __future__ import annotations
 
@@ -12,7 +12,16 @@ MOST = np.uint32(0xFFFFFFFF)
 
 @njit(cache=True, nogil=True)
 def update_average(confidence: Floats32, count: Counts, z: Floats32, cap: int) -> None:
-    """x += w (z - x), w = 1 / (k + 1), where z is not 0; k stops growing at `cap`."""
+    """Update running averages in place where z is not 0: x += (z - x) / (k + 1).
+
+    Parameters
+    ----------
+    confidence, count : ndarray, shape (n,)
+        Average x and count k, updated in place.
+    z : ndarray of float32, shape (n,)
+    cap : int
+        Value at which counts stop.
+    """
     for i in range(z.size):
         if z[i] != 0.0:
             k = count[i]
@@ -24,7 +33,15 @@ def update_average(confidence: Floats32, count: Counts, z: Floats32, cap: int) -
 
 @njit(cache=True, nogil=True)
 def merge_average(confidence: Floats32, count: Counts, other: Floats32, others: Counts) -> None:
-    """Count-weighted mean of two averages, in place in the first; counts stop at their largest."""
+    """Merge two running averages, weighted by their counts, in place; counts saturate.
+
+    Parameters
+    ----------
+    confidence, count : ndarray, shape (n,)
+        Updated in place.
+    other, others : ndarray, shape (n,)
+        Averages and counts that are added.
+    """
     for i in range(other.size):
         if others[i] > 0:
             ours, theirs = np.float64(count[i]), np.float64(others[i])
@@ -35,9 +52,16 @@ def merge_average(confidence: Floats32, count: Counts, other: Floats32, others: 
 
 @njit(cache=True, nogil=True)
 def keep_low(z: Floats32, height: Floats32, sight: float, top: float, low: Floats32) -> None:
-    """Copy to `low` the free evidence of sight below `sight` and the non-free of tops below `top`.
+    """Copy evidence below a height.
 
-    All arrays have the shape (n,); heights are in metres.
+    Parameters
+    ----------
+    z, height : ndarray of float32, shape (n,)
+        Evidence and its height [m].
+    sight, top : float [m]
+        Heights below which free and non-free evidence is copied.
+    low : ndarray of float32, shape (n,)
+        Destination.
     """
     for i in range(z.size):
         if z[i] != 0.0 and height[i] < (sight if z[i] < 0.0 else top):

@@ -29,8 +29,8 @@ def find_hidden(
         x0, y0, x1, y1 of the edges of all footprints, one footprint after the other.
     starts : ndarray, shape (p + 1,)
         Index of the first edge of each footprint; the last is e.
-    heights : ndarray, shape (p, 2)
-        Bottom and top of each prism.
+    heights : ndarray, shape (p, 4)
+        Of each prism the bottom, the height of the top at x = y = 0, and its rise along x and y.
     out : ndarray of bool, shape (n,)
         Set to whether each target is hidden.
     """
@@ -47,7 +47,7 @@ def find_hidden(
         for p in range(prisms):
             if _beside(eye, target, boxes[p]):
                 continue
-            first, last = _between(eye[2], target[2], heights[p, 0], heights[p, 1])
+            first, last = _between(eye, target, heights[p])
             if last - first <= TINY:
                 continue
             count = _cross(eye, target, edges[starts[p] : starts[p + 1]], crossings)
@@ -109,8 +109,21 @@ def _beside(eye: Floats, target: Floats, box: Floats) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def _between(start: float, end: float, bottom: float, top: float) -> tuple[float, float]:
-    """Return the interval, in 0 to 1, in which a line of sight is between two heights."""
+def _between(eye: Floats, target: Floats, heights: Floats) -> tuple[float, float]:
+    """Return the interval, in 0 to 1, in which a line of sight is between bottom and top."""
+    bottom, top = heights[0], heights[1]
+    if heights[2] != 0.0 or heights[3] != 0.0:
+        from_top = eye[2] - top - heights[2] * eye[0] - heights[3] * eye[1]
+        to_top = target[2] - top - heights[2] * target[0] - heights[3] * target[1]
+        first, last = _within(from_top, to_top, -np.inf, 0.0)
+        above, below = _within(eye[2], target[2], bottom, np.inf)
+        return max(first, above), min(last, below)
+    return _within(eye[2], target[2], bottom, top)
+
+
+@njit(cache=True, nogil=True)
+def _within(start: float, end: float, bottom: float, top: float) -> tuple[float, float]:
+    """Return the interval, in 0 to 1, in which a line is between two heights."""
     if start == end:
         if bottom < start < top:
             return 0.0, 1.0

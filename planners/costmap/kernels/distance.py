@@ -70,10 +70,27 @@ def squared_distances_3d(blocked: Bools, cap: int) -> Ints32:
     -------
     ndarray of int32, shape (layers, rows, cols) [(half voxels)²]
     """
+    squared = np.empty(blocked.shape, dtype=np.int32)
+    fill_squared_distances_3d(blocked, cap, squared)
+    return squared
+
+
+@njit(cache=True, nogil=True)
+def fill_squared_distances_3d(blocked: Bools, cap: int, squared: Ints32) -> None:
+    """Write the distances of `squared_distances_3d` to an array of any type that holds the cap.
+
+    Parameters
+    ----------
+    blocked : ndarray of bool, shape (layers, rows, cols)
+    cap : int [(half voxels)²]
+        Larger ones are cut to this.
+    squared : ndarray of int32, uint32 or uint16, shape (layers, rows, cols)
+        Set.
+    """
     layers, rows, cols = blocked.shape
-    squared = np.empty((layers, rows, cols), dtype=np.int32)
     for layer in range(layers):
-        squared[layer] = squared_distances(blocked[layer], NOWHERE)
+        # Cut within the layers, too: what is added across them only makes distances larger.
+        squared[layer] = squared_distances(blocked[layer], cap)
     within = np.empty((cols, layers), dtype=np.int64)
     room = layers + 1
     border, at = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
@@ -87,7 +104,6 @@ def squared_distances_3d(blocked: Bools, cap: int) -> Ints32:
         for layer in range(layers):
             for col in range(cols):
                 squared[layer, row, col] = min(within[col, layer], cap)
-    return squared
 
 
 @njit(cache=True, nogil=True)

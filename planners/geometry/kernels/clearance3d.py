@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from groundmap.arrays import Bools, Floats
+from groundmap.arrays import Bools, Floats, Ints
 
 HALVINGS = 60  # of a piece: beyond the resolution of floats
 
@@ -126,3 +126,67 @@ def _slope(a: Floats, b: Floats, x: int, y: int, z: int, t: float) -> float:
         step = b[axis] - a[axis]
         slope += step * _gap(a[axis] + t * step, corner)
     return slope
+
+
+@njit(cache=True, nogil=True)
+def squared_along(blocked: Bools, cells: Ints, nowhere: int) -> Ints:
+    """Return the squared distances of the centres of voxels to the nearest blocked cube.
+
+    Consecutive voxels should be near each other, as along a line: distances then differ by no more
+    than the voxels are apart, and only cubes in between are looked at.
+
+    Parameters
+    ----------
+    blocked : ndarray of bool, shape (layers, rows, cols)
+    cells : ndarray of int64, shape (n, 3)
+        Layer, row and column.
+    nowhere : int
+        Result where no cube is blocked.
+
+    Returns
+    -------
+    ndarray of int64, shape (n,) [(half voxels)²]
+    """
+    squared = np.full(len(cells), nowhere, dtype=np.int64)
+    for i in range(len(cells)):
+        if i == 0:
+            centre = np.array([cells[0, 2] + 0.5, cells[0, 1] + 0.5, cells[0, 0] + 0.5])
+            least = segment_clearance(blocked, centre, centre, math.inf)
+            if math.isinf(least):
+                break
+            squared[0] = round(4.0 * least * least)
+            continue
+        z, y, x = cells[i] - cells[i - 1]
+        step = 2.0 * math.sqrt(x * x + y * y + z * z)
+        before = math.sqrt(squared[i - 1])
+        low, high = max(before - step - 1.0, 0.0), before + step + 1.0
+        squared[i] = _nearest_between(blocked, cells[i], low, high)
+    return squared
+
+
+@njit(cache=True, nogil=True)
+def _nearest_between(blocked: Bools, cell: Ints, low: float, high: float) -> int:
+    """Return the squared distance of a voxel's centre to the nearest cube [(half voxels)²].
+
+    The distance must be between `low` and `high`.
+    """
+    layers, rows, cols = blocked.shape
+    least, best = int(low * low), int(high * high) + 1
+    reach = int(high) // 2 + 2
+    for z in range(max(cell[0] - reach, 0), min(cell[0] + reach + 1, layers)):
+        off_z = max(2 * abs(z - cell[0]) - 1, 0) ** 2
+        for y in range(max(cell[1] - reach, 0), min(cell[1] + reach + 1, rows)):
+            beside = off_z + max(2 * abs(y - cell[1]) - 1, 0) ** 2
+            if beside >= best:
+                continue
+            first = int(math.sqrt(max(least - beside, 0))) // 2
+            last = int(math.sqrt(best - beside)) // 2 + 1
+            for away in range(first, last + 1):
+                total = beside + max(2 * away - 1, 0) ** 2
+                if total >= best:
+                    break
+                for x in (cell[2] - away, cell[2] + away):
+                    if 0 <= x < cols and blocked[z, y, x]:
+                        best = total
+                        break
+    return best

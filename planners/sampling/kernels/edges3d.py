@@ -7,13 +7,13 @@ As in `planners.geometry.kernels.clearance3d`, positions in voxels are (x, y, z)
 from __future__ import annotations
 
 import math
+from typing import Any, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 from numba import njit
 
-from groundmap.arrays import Ints32
-from planners.costmap.kernels.distance import NOWHERE
-
+Squared: TypeAlias = npt.NDArray[np.unsignedinteger[Any]]
 NEAR = 0.2  # [voxels] margin of clearance below which a line is checked exactly
 PIECE = 1.0  # [voxels] longest piece of a line that is checked exactly
 HALVINGS = 64  # upper bound of the bisections of a line into short pieces
@@ -21,7 +21,7 @@ HALVINGS = 64  # upper bound of the bisections of a line into short pieces
 
 @njit(cache=True, nogil=True)
 def line_clear(
-    squared: Ints32,
+    squared: Squared,
     size: float,
     radius: float,
     slack: float,
@@ -40,8 +40,8 @@ def line_clear(
 
     Parameters
     ----------
-    squared : ndarray of int32, shape (layers, rows, cols)
-        As `MapSpace.all_squared`.
+    squared : ndarray of uint16 or uint32, shape (layers, rows, cols)
+        As `Voxels.near_squared`: at least what the radius needs, where it is cut.
     size : float [m]
         Side of a voxel.
     radius : float [m]
@@ -90,13 +90,13 @@ def line_clear(
 
 
 @njit(cache=True, nogil=True)
-def _within(squared: Ints32, x: float, y: float, z: float) -> bool:
+def _within(squared: Squared, x: float, y: float, z: float) -> bool:
     layers, rows, cols = squared.shape
     return bool(0.0 <= x < cols and 0.0 <= y < rows and 0.0 <= z < layers)
 
 
 @njit(cache=True, nogil=True)
-def _nearness(squared: Ints32, x: float, y: float, z: float) -> tuple[float, float]:
+def _nearness(squared: Squared, x: float, y: float, z: float) -> tuple[float, float]:
     """Return lower and upper bounds of the clearance at a point, from its voxel's centre.
 
     For a point that rounding moved off the map, the nearest voxel is used.
@@ -108,13 +108,13 @@ def _nearness(squared: Ints32, x: float, y: float, z: float) -> tuple[float, flo
     at = squared[layer, row, col]
     u, v, w = x - col - 0.5, y - row - 0.5, z - layer - 0.5
     off = math.sqrt(u * u + v * v + w * w)
-    clearance = math.inf if at == NOWHERE else 0.5 * math.sqrt(at)
+    clearance = 0.5 * math.sqrt(at)
     return clearance - off, clearance + off
 
 
 @njit(cache=True, nogil=True)
 def _piece_clear(
-    squared: Ints32,
+    squared: Squared,
     x: float,
     y: float,
     z: float,

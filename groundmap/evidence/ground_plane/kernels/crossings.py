@@ -1,4 +1,4 @@
-"""What is known of a place inside a segment, from what is known of its ends."""
+"""Interpolation of heights and covariances at vertices inside segments."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from groundmap.arrays import Floats, Ints
 def blend_crossings(
     crossings: Ints, points: Floats, low: Floats, high: Floats, covariance: Floats
 ) -> None:
-    """Give each vertex inside a segment the heights and the covariance that the segment has there.
+    """Set heights and covariance of vertices inside segments, interpolated between the ends.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def blend_crossings(
     low, high : ndarray, shape (n,)
         Height bands, widened in place.
     covariance : ndarray, shape (n, 2, 2)
-        Set in place: of several segments, the last one's.
+        Set in place; of several segments, the last one counts.
     """
     for vertex, a, b in crossings:
         length = np.hypot(points[b, 0] - points[a, 0], points[b, 1] - points[a, 1])

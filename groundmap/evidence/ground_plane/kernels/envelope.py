@@ -1,7 +1,7 @@
-"""Which of many straight edges is nearest (or farthest) at each bearing, all at once.
+"""Envelopes: the nearest or farthest of many straight edges at each bearing.
 
-Seen from the origin, an edge has at bearing t the inverse range a cos t + b sin t: two edges meet
-at most once, so the nearest edges are an upper envelope, merged pairwise in O(n log n).
+Seen from the origin, an edge has the inverse range a cos t + b sin t at bearing t. Two edges cross
+at most once, so the nearest edges are an upper envelope, which is merged pairwise in O(n log n).
 """
 
 from __future__ import annotations
@@ -16,16 +16,21 @@ NO_EDGE = -1
 
 @njit(cache=True, nogil=True)
 def upper_envelope(t0: Floats, t1: Floats, a: Floats, b: Floats) -> tuple[Floats, Floats, Ints]:
-    """Return (lower bearing, upper bearing, edge) of the pieces of the maximum, in order.
+    """Return the pieces of the maximum of edges: (lower bearing, upper bearing, edge), in order.
 
-    Edge i spans the bearings t0[i] < t1[i], less than a half turn, with a[i] cos t + b[i] sin t.
+    Parameters
+    ----------
+    t0, t1 : ndarray, shape (n,) [rad]
+        Bearings of the ends of each edge, t0 < t1, less than a half turn apart.
+    a, b : ndarray, shape (n,) [1/m]
+        Coefficients of the inverse range a cos t + b sin t.
     """
     count = t0.size
     low, high = t0.copy(), t1.copy()
     edge = np.arange(count)
     first = np.arange(count + 1)  # envelope e holds the pieces first[e] to first[e + 1]
     while first.size > 2:
-        pairs = first.size // 2  # envelopes come in pairs; an odd one is carried over
+        pairs = first.size // 2  # an unpaired envelope is copied
         room = 4 * low.size + 4
         new_low, new_high = np.empty(room), np.empty(room)
         new_edge, new_first = np.empty(room, np.int64), np.zeros(pairs + 1, np.int64)
@@ -60,7 +65,7 @@ def _merge(
     while i < i1 or j < j1:
         at_i = max(low[i], here) if i < i1 else np.inf
         at_j = max(low[j], here) if j < j1 else np.inf
-        if at_i < at_j:  # only the first envelope speaks, up to where the second begins
+        if at_i < at_j:  # only the first envelope, up to the start of the second
             here = min(high[i], at_j)
             size = _append(at_i, here, edge[i], new_low, new_high, new_edge, start, size)
         elif at_j < at_i:
@@ -89,7 +94,7 @@ def _append(
     start: int,
     size: int,
 ) -> int:
-    """Append a piece, or lengthen the last one if it goes on."""
+    """Append a piece, or extend the last one if the piece continues it."""
     if upper <= lower:
         return size
     if size > start and edges[size - 1] == edge and high[size - 1] == lower:
@@ -113,7 +118,7 @@ def _append_higher(
     start: int,
     size: int,
 ) -> int:
-    """Append the higher of two edges, and the other one behind their crossing, if they cross."""
+    """Append the higher of two edges, and beyond a crossing the other one."""
     da, db = a[i] - a[j], b[i] - b[j]
     crossing = _crossing(da, db, lower, upper)
     if crossing > lower:
@@ -140,12 +145,32 @@ def join_envelopes(
     far_a: Floats,
     far_b: Floats,
 ) -> tuple[Floats, Floats, Ints, Bools]:
-    """Join the nearest edges and the farthest supports into what bounds freespace.
+    """Return the bounds of freespace, from the nearest edges and the farthest supports.
 
-    Where an edge stands `alone`, it bounds; an edge that does not needs a support, and the nearer
-    of both bounds; where there is no edge, the support does.
+    An edge that is `alone` bounds freespace. At other edges the nearer of edge and support does,
+    if there is a support. Without an edge, the support does.
 
-    Returns (lower bearing, upper bearing, edge, whether it is a support's), in order.
+    Parameters
+    ----------
+    low, high : ndarray, shape (k,) [rad]
+        Bearings of the pieces of the nearest edges, in order.
+    edge : ndarray of int, shape (k,)
+        Edge of each piece.
+    alone : ndarray of bool, shape (n,)
+        Edges that bound freespace without a support.
+    a, b : ndarray, shape (n,) [1/m]
+        Coefficients of the edges' inverse ranges.
+    far_low, far_high : ndarray, shape (l,) [rad]
+        Bearings of the pieces of the farthest supports, in order.
+    far_edge : ndarray of int, shape (l,)
+        Support of each piece.
+    far_a, far_b : ndarray, shape (m,) [1/m]
+        Coefficients of the supports' inverse ranges.
+
+    Returns
+    -------
+    tuple
+        Lower bearing, upper bearing, edge or support, and whether it is a support; in order.
     """
     room = 4 * (low.size + far_low.size) + 4
     out_low, out_high = np.empty(room), np.empty(room)
@@ -196,7 +221,7 @@ def _append_nearer(
     second: Bools,
     size: int,
 ) -> int:
-    """Append the nearer of an edge and a support, and the other behind their crossing.
+    """Append the nearer of an edge and a support, and beyond a crossing the other one.
 
     At bearing t the edge is nearer where da cos t + db sin t is above zero.
     """
@@ -213,7 +238,7 @@ def _append_nearer(
 
 @njit(cache=True, nogil=True)
 def _crossing(da: float, db: float, lower: float, upper: float) -> float:
-    """Return where da cos t + db sin t changes its sign between two bearings, or the lower one."""
+    """Return the root of da cos t + db sin t between two bearings, or `lower` without one."""
     at_lower = da * np.cos(lower) + db * np.sin(lower)
     at_upper = da * np.cos(upper) + db * np.sin(upper)
     if (at_lower < 0.0) != (at_upper < 0.0) and at_lower != 0.0 and at_upper != 0.0:

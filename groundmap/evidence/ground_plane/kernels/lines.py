@@ -1,4 +1,4 @@
-"""Lines of sight in the ground plane: what they pass through, and the gaps between them.
+"""Lines of sight in the ground plane: surfaces that they cross, and gaps between them.
 
 The viewpoint is the origin. Lines are sorted by bearing.
 """
@@ -13,7 +13,7 @@ from groundmap.arrays import Bools, Floats
 WIDEST_GAP = 1.5  # [rad], between two lines: a chord must not pass the viewpoint
 SAME_BEARING = 1e-9  # [rad]: what differs by less is rounding
 SAME_RANGE = 1e-9  # [m]
-NARROWEST_GAP = 1e-9  # [rad], and of a surface: nothing is seen through one seen end-on
+NARROWEST_GAP = 1e-9  # [rad], between two lines; least angle of a surface
 
 
 @njit(cache=True, nogil=True)
@@ -31,21 +31,21 @@ def count_contradicting(
     against: Floats,
     passes: Bools,
 ) -> None:
-    """Count, for each surface, the features behind it that are seen below its top.
+    """Count the features behind each surface that are seen below its top.
 
     Parameters
     ----------
     ends : ndarray, shape (s, 2, 2)
-        Counter-clockwise around the viewpoint.
+        Surfaces, counter-clockwise around the viewpoint.
     reach, tops : ndarray, shape (s, 2)
-        At both ends.
+        Values at both ends of the surfaces.
     bearings, points, heights, shares : ndarray, shapes (n,), (n, 2), (n,), (n,)
-        Of the features, sorted by bearing; `shares` is what each row counts.
+        Features sorted by bearing, and the weight of each row.
     camera_height, behind, below : float
-        A feature is behind if it is so by twice the reach and `behind`; its line of sight passes
-        below the top if it does by `below`.
+        A feature is behind a surface if the distance exceeds twice the reach plus `behind`; it is
+        seen below the top if its line of sight passes more than `below` under it.
     against : ndarray, shape (s,)
-        What is counted is added here.
+        Counts, increased in place.
     passes : ndarray of bool, shape (n,)
         Set where a feature is seen through any surface.
     """
@@ -83,19 +83,19 @@ def count_contradicting(
 def features_beside(
     rays: Floats, first: Floats, last: Floats, points: Floats, width: float, beside: Bools
 ) -> None:
-    """Tell which lines of sight have a point beside them.
+    """Find the lines of sight with a point beside them.
 
     Parameters
     ----------
     rays : ndarray, shape (n, 2)
-        Directions of the lines, of length 1.
+        Unit vectors along the lines.
     first, last : ndarray, shape (n,)
-        Between which distances along the line a point counts.
+        Bounds of a point's distance along the line.
     points : ndarray, shape (k, 2)
     width : float
-        How far across the line a point may be.
+        Bound of a point's distance from the line.
     beside : ndarray of bool, shape (n,)
-        Set to the answer.
+        Result, set in place.
     """
     for i in range(len(rays)):
         x, y = rays[i]
@@ -112,18 +112,29 @@ def features_beside(
 def gap_chords(
     bearings: Floats, ranges: Floats, heights: Floats, eye: float, widest: float
 ) -> tuple[Floats, Floats]:
-    """Return chords between lines of sight that nothing `widest` wide fits between.
+    """Return the chords between neighbouring lines of sight.
 
-    Two lines are neighbours at a range if no line between them reaches as far. Their chord lies
-    where both still reach and are `widest` apart at most. Lines lead from `eye` above the ground
-    to `heights` at their ranges.
+    Two lines are neighbours at a range if all lines between them are shorter. Their chord lies at
+    the largest range that both reach and at which they are at most `widest` apart.
 
-    Returns the chords, shape (k, 2, 2), counter-clockwise, and how high sight is at their ends,
-    shape (k, 2).
+    Parameters
+    ----------
+    bearings, ranges, heights : ndarray, shape (n,)
+        Bearing [rad], length [m] and height at the end [m] of each line.
+    eye : float [m]
+        Height of the lines at the viewpoint.
+    widest : float [m]
+
+    Returns
+    -------
+    chords : ndarray, shape (k, 2, 2) [m]
+        Counter-clockwise.
+    ends : ndarray, shape (k, 2) [m]
+        Heights of the lines at the ends of the chords.
     """
     count = len(bearings)
     chords, ends = np.empty((2 * count, 2, 2)), np.empty((2 * count, 2))
-    stack = np.empty(count, np.int64)  # lines that something to the left may still neighbour
+    stack = np.empty(count, np.int64)  # lines that may have another neighbour to the left
     size, top = 0, 0
     for j in range(count):
         while top > 0:

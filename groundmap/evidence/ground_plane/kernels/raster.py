@@ -1,7 +1,7 @@
 """Drawing into a dense block of cells; coordinates are in cells, x along columns, y along rows.
 
-A cell is inside a polygon if its centre is; borders are half-open, so that polygons that share a
-border share no cell and leave none out. A line touches every cell that it passes through.
+A cell is inside a polygon if its centre is. Borders are half-open: of two polygons that share a
+border, exactly one contains a cell on it. A line covers every cell that it passes through.
 Features in whole pixels, and viewpoints on corners of cells, put borders exactly on centres: what
 lies on a border up to rounding counts by one rule.
 """
@@ -14,19 +14,31 @@ from numba import njit
 from groundmap.arrays import Bools, Bytes, Floats, Floats32
 
 FREE = np.float32(-1.0)
-NO_TOP = np.float32(np.inf)  # where a surface may be, but was not seen
+NO_TOP = np.float32(np.inf)  # in the spread around a surface
 EDGE = 1e-9  # [cells]: places this near to a border or a centre are on it, whatever the rounding
-STEPS = np.float32(64.0)  # [1/m], heights are rounded up to: where a map lies doesn't change them
+STEPS = np.float32(64.0)  # [1/m], heights are rounded up to 1/64 m to hide rounding errors
 
 
 @njit(cache=True, nogil=True)
 def fill_star(
     z: Floats32, odd: Bytes, origin: Floats, start: Floats, end: Floats, joined: Bools
 ) -> None:
-    """Set to -1 the cells of a star polygon, in one parity pass.
+    """Set the cells of a star polygon to -1, in one parity pass.
 
-    The polygon runs start[0], end[0], start[1], ..., and through `origin` where a piece is not
-    joined to the next. `odd` is a block of zeros of z's shape; it is used up.
+    The polygon is start[0], end[0], start[1], ..., with `origin` between pieces that are not
+    joined.
+
+    Parameters
+    ----------
+    z : ndarray of float32
+        Changed in place.
+    odd : ndarray of uint8, of z's shape
+        Work array of zeros, changed in place.
+    origin : ndarray, shape (2,) [cells]
+    start, end : ndarray, shape (k, 2) [cells]
+        Ends of the pieces.
+    joined : ndarray of bool, shape (k,)
+        Whether the next piece (cyclic) begins at the end of each piece.
     """
     count = len(start)
     for i in range(count):
@@ -82,12 +94,31 @@ def draw_surfaces(
     origin: Floats,
     farthest: float,
 ) -> None:
-    """Raise z to what each surface says: on it, and in the spread around it.
+    """Raise z to the evidence of surfaces and of the spread around them.
 
-    Non-free evidence wins over free, and the surer over the less sure: z is a maximum, and
-    `height` the top of the surface that it comes from (of equally sure ones, the highest that is
-    known: near the camera, what is around a surface is as sure as the surface). Nothing spreads
-    beyond `farthest` from `origin`; `sides` are the outlines, pulled to within that distance.
+    A cell gets the maximum z of all surfaces, and the height of this surface's top; of several
+    surfaces with this z, the highest top that is known (near the camera, the spread around a
+    surface has the z of the surface). Nothing spreads beyond `farthest` from `origin`.
+
+    Parameters
+    ----------
+    z, height : ndarray of float32
+        Evidence and its height [m], changed in place.
+    ends, cores : ndarray, shape (s, 2, 2) [cells]
+        Ends of the surfaces, and centres of the caps.
+    outlines : ndarray, shape (s, 4, 2) [cells]
+        Quadrangles of the spread.
+    sides : ndarray, shape (s, 4, 2) [cells]
+        The same corners, pulled to within `farthest`.
+    caps : ndarray, shape (s, 2) [cells]
+        Radii of the caps of the spread; 0 for none.
+    discs : ndarray, shape (s,) [cells]
+        Radii of the discs of lone points; 0 for other surfaces.
+    on_surface, around : ndarray, shape (s,)
+        Values of z on the surface and in its spread.
+    tops : ndarray, shape (s,) [m]
+    origin : ndarray, shape (2,) [cells]
+    farthest : float [cells]
     """
     for i in range(len(ends)):
         spread, top = np.float32(around[i]), np.float32(tops[i])
@@ -182,7 +213,7 @@ def _draw_line(
     next_y = ((row + (dy > 0)) - p[1]) / dy if dy != 0.0 else np.inf
     each_x = abs(1.0 / dx) if dx != 0.0 else np.inf
     each_y = abs(1.0 / dy) if dy != 0.0 else np.inf
-    # The number of borders is known beforehand, so rounding can't make the walk miss its end.
+    # The number of steps is fixed, so rounding can't make the walk miss its end.
     for _ in range(abs(last_col - col) + abs(last_row - row) + 1):
         if 0 <= row < z.shape[0] and 0 <= col < z.shape[1]:
             _raise(z, height, row, col, value, top)
@@ -198,7 +229,7 @@ def _draw_line(
 def _raise(
     z: Floats32, height: Floats32, row: int, col: int, value: np.float32, top: np.float32
 ) -> None:
-    """Raise a cell to the surer value, and to the highest known top among equally sure ones."""
+    """Raise a cell to a higher value with its top, or at an equal value to the higher known top."""
     if value > z[row, col]:
         z[row, col], height[row, col] = value, top
     elif value == z[row, col]:
@@ -215,13 +246,15 @@ def lowest_sight(
     Parameters
     ----------
     height : ndarray of float32 [m]
-        Is lowered where lines pass below it, not below 0; then rounded up to multiples of 1/64 m.
+        Lowered in place, not below 0, and rounded up to multiples of 1/64 m.
     origin : ndarray, shape (2,) [cells]
-        Where the camera is, `eye` [m] above the ground.
+        Position of the camera.
+    eye : float [m]
+        Height of the camera above the ground.
     ends : ndarray, shape (k, 2, 2) [cells]
-        Lines of sight fill the triangles (camera, end, end), counter-clockwise ones.
+        Lines of sight fill the triangles (camera, end, end), which are counter-clockwise.
     end_heights : ndarray, shape (k, 2) [m]
-        How high they are at the ends.
+        Heights of the lines at the ends.
     """
     for i in range(len(ends)):
         ax, ay = ends[i, 0, 0] - origin[0], ends[i, 0, 1] - origin[1]
@@ -230,8 +263,8 @@ def lowest_sight(
         if area <= 0.0:
             continue
         fall_a, fall_b = end_heights[i, 0] - eye, end_heights[i, 1] - eye
-        # The line's height is linear over the triangle. Both products are added in one step, so
-        # that a quarter turn of the map only swaps them.
+        # The height is linear over the triangle. The order of the products keeps results equal
+        # under quarter turns of the map.
         slope_x = (by * fall_a - ay * fall_b) / area
         slope_y = (ax * fall_b - bx * fall_a) / area
         first = max(_first_centre(origin[1] + min(0.0, ay, by)), 0)
@@ -253,7 +286,15 @@ def lowest_sight(
 
 @njit(cache=True, nogil=True)
 def roll_over(z: Floats32, height: Floats32, centre: Floats, radius: float) -> None:
-    """Set the cells whose centres lie within a disc to -1, at height 0: wheels touch them."""
+    """Set the cells with centres in a disc to -1, at height 0: the ground below the base.
+
+    Parameters
+    ----------
+    z, height : ndarray of float32
+        Evidence and its height [m], changed in place.
+    centre : ndarray, shape (2,) [cells]
+    radius : float [cells]
+    """
     for row in range(
         max(_first_centre(centre[1] - radius), 0),
         min(_first_centre(centre[1] + radius) + 1, z.shape[0]),
@@ -269,7 +310,7 @@ def roll_over(z: Floats32, height: Floats32, centre: Floats, radius: float) -> N
 
 @njit(cache=True, nogil=True)
 def _span(y: float, ax: float, ay: float, bx: float, by: float) -> tuple[float, float]:
-    """Return where the triangle (0, 0), a, b begins and ends in a row."""
+    """Return the bounds of the triangle (0, 0), a, b in a row."""
     left, right = np.inf, -np.inf
     for px, py, qx, qy in ((0.0, 0.0, ax, ay), (ax, ay, bx, by), (bx, by, 0.0, 0.0)):
         if min(py, qy) - EDGE <= y <= max(py, qy) + EDGE:

@@ -1,4 +1,4 @@
-"""Averaging features with their neighbours, along the lines of sight."""
+"""Smoothing of features along their lines of sight, by a fit to neighbours."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from numba import njit
 
 from groundmap.arrays import Floats
 
-WIDEST = 0.2  # [rad], of a neighbourhood to either side
-MOST = 2048  # neighbours to either side: more say nothing new, and all of all would be a square
-FEWEST = 3  # neighbours, itself included, to average; one more, to fit a slope
+WIDEST = 0.2  # [rad], largest half-width of a neighbourhood
+MOST = 2048  # neighbours to either side, which bounds the time in dense views
+FEWEST = 3  # features to average, including itself; a slope takes one more
 SAME_BEARING = 1e-9  # [rad]: neighbours whose bearings spread less are at one bearing
-STIFFEST = 1e-3  # of the fit's determinant: below this the neighbours are all at one bearing
+STIFFEST = 1e-3  # least relative determinant of a fit; below it, all neighbours have one bearing
 
 
 @njit(cache=True, nogil=True)
@@ -24,20 +24,20 @@ def smooth_along_rays(
     smoothed: Floats,
     deviation: Floats,
 ) -> None:
-    """Fit, around each feature, a straight surface to those that may be on it.
+    """Fit a straight surface to the neighbours of each feature.
 
     Parameters
     ----------
     bearings, inverse, sigma : ndarray, shape (n,)
-        Sorted by bearing: bearing, inverse range, and the inverse range's standard deviation. Along
-        a straight surface the inverse range is linear in the bearing, to first order.
+        Bearing, inverse range and its standard deviation, sorted by bearing. Along a straight
+        surface, the inverse range is linear in the bearing to first order.
     half_width : float [m]
-        How far neighbours are across the line of sight.
+        Largest distance of neighbours across the line of sight.
     gate : float
-        How far their inverse ranges differ [standard deviations of the difference].
+        Largest difference of inverse ranges [standard deviations of the difference].
     smoothed, deviation : ndarray, shape (n,)
-        Set to the fit at the feature's own bearing and its standard deviation. No feature is moved
-        nearer or farther than all of its neighbours: a steep fit may leave the half-line of sight.
+        Set to the fit at the feature's own bearing and to its standard deviation. The fit is
+        clamped to the range of the neighbours, as a steep one may be behind the viewpoint.
     """
     count = len(bearings)
     for i in range(count):
