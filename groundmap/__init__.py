@@ -1,6 +1,7 @@
 """Confidence grids for path planning, from sparse stereo features."""
 
 from groundmap.errors import GroundmapError
+from groundmap.grid.cell_set import CellSet
 from groundmap.grid.grid import ConfidenceGrid
 from groundmap.grid.window import CellState, GridWindow
 from groundmap.io import load_map, read_views, write_views
@@ -13,6 +14,7 @@ from groundmap.view.stereo_rig import StereoRig
 from groundmap.view.view import Features, View
 
 __all__ = [
+    "CellSet",
     "CellState",
     "ConfidenceGrid",
     "Features",

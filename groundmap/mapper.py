@@ -13,11 +13,13 @@ from groundmap.evidence.evidence import Evidence
 from groundmap.evidence.ground_plane.height_classes import GroundView, flatten
 from groundmap.evidence.ground_plane.rasterised import evidence_of
 from groundmap.evidence.ground_plane.ray_smoothing import smooth_features
-from groundmap.evidence.ground_plane.surfaces import Surfaces, find_surfaces
+from groundmap.evidence.ground_plane.surfaces import SurfaceKind, Surfaces, find_surfaces
 from groundmap.evidence.ground_plane.visibility import SightFan, visible_freespace
 from groundmap.evidence.triangulation import Mesh, triangulate
+from groundmap.grid.cell_set import CellSet
 from groundmap.grid.fusion import RULES
 from groundmap.grid.grid import ConfidenceGrid
+from groundmap.grid.recent_views import RecentView, RecentViews
 from groundmap.settings import MapperSettings
 from groundmap.stopwatch import Stopwatch
 from groundmap.view.frames import map_from_world
@@ -25,6 +27,7 @@ from groundmap.view.ground_fit import fit_ground
 from groundmap.view.stereo_rig import StereoRig
 from groundmap.view.view import View
 
+PLACES = 2.0**30  # [1/m], of the triangulated places: about a nanometre
 # Heights that evidence is kept apart by [step_height]. Below the lowest, sight touches the ground.
 SIGHT_STEPS = (1 / 3, 1.0, 4.0)
 
@@ -75,6 +78,8 @@ class GroundMapper:
     stages : Stopwatch
     changed : ndarray, shape (n, 2)
         Cells ``[row, col]`` that the last view changed, for incremental planners.
+    recent : CellSet
+        Cells that the newest views saw as non-free, for `planners.PlanningProblem`.
 
     Raises
     ------
@@ -104,6 +109,12 @@ class GroundMapper:
             rule=RULES[self.settings.fusion](**parameters),
             heights=tuple(share * self.settings.step_height for share in SIGHT_STEPS),
         )
+        self.grid.recent_views = RecentViews(
+            views=self.settings.recent_views,
+            seconds=self.settings.recent_seconds,
+            spacing=self.settings.narrowest_footprint,
+            depth=self.settings.recent_depth,
+        )
         self.stats = MapperStats()
         self.stages = stages or Stopwatch()
         self.changed: Ints = np.empty((0, 2), dtype=np.int64)
@@ -122,18 +133,26 @@ class GroundMapper:
             The view has no ground plane, or one that is not below its camera, or the camera looks
             at the ground or the sky.
         InputError
-            The view would need more cells than a map can have.
+            The view would need more cells than a map can have, or has no timestamp although
+            `recent_seconds` is set.
         """
+        self.grid.recent_views.check(view.timestamp)
         parts = self.explain(view)
         with self.stages.measure("fuse"):
             self.grid.fuse(*parts.evidence)
             self.changed = parts.evidence.cells()
+            self.grid.recent_views.add(_recent_view(parts, view.timestamp))
             self.grid.trajectory = np.concatenate([self.grid.trajectory, _pose2d(view)])
         self.stats.views += 1
         self.stats.features_used += parts.ground_view.used
         self.stats.features_dropped.update(parts.ground_view.dropped)
         self.stats.seen_through += parts.fan.contradictions.features
         self.stats.through_viewpoint += parts.surfaces.through_viewpoint
+
+    @property
+    def recent(self) -> CellSet:
+        """What is there now: the cells that the newest views saw as non-free, see `grid`."""
+        return self.grid.recent
 
     def explain(self, view: View) -> ViewParts:
         """Return the evidence of one view with all intermediate results, without fusing it.
@@ -147,7 +166,10 @@ class GroundMapper:
             ground_view = flatten(view, self.settings, number=self.stats.views)
             ground_view = smooth_features(ground_view, self.settings)
         with self.stages.measure("triangulate"):
-            mesh = triangulate(ground_view.points, ground_view.segments)
+            # Where points lie on a line or a circle, rounding of the input must not choose between
+            # triangulations that are equally good.
+            places = np.round(ground_view.points * PLACES) / PLACES
+            mesh = triangulate(places, ground_view.segments)
         with self.stages.measure("surfaces"):
             surfaces = find_surfaces(ground_view, mesh, self.settings)
         with self.stages.measure("sight"):
@@ -155,6 +177,22 @@ class GroundMapper:
         with self.stages.measure("evidence"):
             evidence = evidence_of(ground_view, surfaces, fan, self.grid, self.settings)
         return ViewParts(ground_view, mesh, surfaces, fan, evidence)
+
+
+def _recent_view(parts: ViewParts, timestamp: float | None) -> RecentView:
+    """Return what is kept of a view as long as it is one of the newest."""
+    surfaces, evidence = parts.surfaces, parts.evidence
+    believed = (surfaces.kind != SurfaceKind.DOUBTFUL) & (parts.fan.contradictions.against == 0)
+    missing = np.empty((0, 2), dtype=np.int64)
+    if len(parts.ground_view.drop_offs) and evidence.height is not None:
+        missing = np.argwhere((evidence.z > 0) & (evidence.height < 0)) + evidence.lower
+    return RecentView(
+        parts.ground_view.to_map(surfaces.ends[believed]),
+        surfaces.kind[believed] != SurfaceKind.LINK,
+        missing,
+        parts.ground_view.viewpoint,
+        timestamp,
+    )
 
 
 def _pose2d(view: View) -> Floats:

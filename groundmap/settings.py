@@ -189,6 +189,23 @@ class MapperSettings(Settings):
     support_angle: float = Field(
         0.05, gt=0, le=LARGEST, description="upper bound of this half-width as an angle [rad]"
     )
+    recent_views: int = Field(
+        2,
+        ge=0,
+        le=10_000,
+        description="number of newest views whose non-free cells are kept beside the map",
+    )
+    recent_seconds: float | None = Field(
+        None,
+        gt=0,
+        description="the same as a time, for views with timestamps; replaces recent_views [s]",
+    )
+    recent_depth: float = Field(
+        4.5,
+        ge=0,
+        le=LARGEST,
+        description="distance behind newly seen things over which hidden cells are kept, too [m]",
+    )
 
     def check(self) -> None:
         """Check the order of ranges and heights, and the number of cells along `max_range`."""

@@ -105,7 +105,13 @@ def plan_many(
     if not problems:
         return []
     costmap = Costmap.of(problems[0])
-    for name in ("moves", "steps", "clearance"):  # computed once, not by each thread
+    for name in (
+        "moves",
+        "steps",
+        "clearance",
+        "kept_out",
+        "recent",
+    ):  # computed once, not by each thread
         getattr(costmap, name)
     stop = threading.Event()
     watch = {"cancel": stop} if chosen.anytime else {}

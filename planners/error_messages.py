@@ -8,6 +8,10 @@ from typing import Literal, NamedTuple, TypeAlias
 Place: TypeAlias = Literal["start", "goal"]
 Turning: TypeAlias = Literal["none", "any", "planned"]
 Point: TypeAlias = tuple[float, ...]  #: x, y (on a 3-D map also z) [m, map]
+SEPARATORS = {  # by the problem's field
+    "keep_out": "the keep-out areas",
+    "recent": "what the newest views saw as non-free",
+}
 MOST_DECIMALS = 9  # of a width [m]; smaller differences are rounding errors
 
 
@@ -108,6 +112,14 @@ def way_out_clause(way_out: WayOut | None) -> str:
 def left_clause(left: float | None) -> str:
     """Return the remaining distance to the goal [m] as a clause; "" if it is unknown."""
     return "" if left is None else f", {left:.2f} m from the goal"
+
+
+def without_clause(without: tuple[str, ...]) -> str:
+    """Return a sentence on what separates start and goal; "" if it is the map alone."""
+    if not without:
+        return ""
+    what = " and ".join(SEPARATORS[name] for name in without)
+    return f" Without {what} they are connected."
 
 
 def nearest_clause(xy: Point, nearest: Point | None) -> str:

@@ -7,6 +7,7 @@
     ├── NoRouteError                 a valid problem without a route
     │   ├── OutsideMapError          start or goal lies outside the map
     │   ├── NonFreeError             the footprint overlaps non-free space there
+    │   ├── KeepOutError             the footprint overlaps a keep-out area there
     │   ├── UnknownSpaceError        the footprint overlaps unknown or contested space there
     │   ├── EnclosedError            start and goal are not connected
     │   ├── SmoothingError           the clearance does not allow the turning radius
@@ -34,6 +35,7 @@ from planners.error_messages import (
     nearest_clause,
     way_out_clause,
     widest_clause,
+    without_clause,
 )
 
 
@@ -114,6 +116,8 @@ class NonFreeError(NoRouteError):
         Nearest position where the footprint fits.
     yaw : float, optional [rad]
         Heading of a polygon footprint, if the planner plans headings.
+    recent : bool, default False
+        Whether only the newest views saw it as non-free, not the map.
 
     Examples
     --------
@@ -131,12 +135,55 @@ is 0.42 m. The nearest position where the footprint fits is (12.30, 4.70), 0.60 
         needed: float,
         nearest: Point | None = None,
         yaw: float | None = None,
+        recent: bool = False,
+    ) -> None:
+        self.place, self.xy, self.clearance, self.needed = place, xy, clearance, needed
+        self.nearest, self.yaw, self.recent = nearest, yaw, recent
+        space = "space that the newest views saw as non-free" if recent else "non-free space"
+        super().__init__(
+            f"{format_place(place, xy)}: {footprint_clause(needed, yaw)} overlaps {space}; "
+            f"the clearance there is {clearance:.2f} m.{nearest_clause(xy, nearest)}"
+        )
+
+
+class KeepOutError(NoRouteError):
+    """The footprint overlaps a keep-out area at the start or the goal.
+
+    Parameters
+    ----------
+    place : {"start", "goal"}
+    xy : tuple of float [m, map]
+    clearance : float [m]
+        Distance from there to the nearest cell of such an area.
+    needed : float [m]
+        Radius of the footprint.
+    nearest : tuple of float, optional [m, map]
+        Nearest position where the footprint fits.
+    yaw : float, optional [rad]
+        Heading of a polygon footprint, if the planner plans headings.
+
+    Examples
+    --------
+    >>> print(KeepOutError("goal", (12.3, 4.1), clearance=0.42, needed=0.9, nearest=(12.3, 4.7)))
+    goal (12.30, 4.10): the footprint (radius 0.90 m) overlaps a keep-out area, which begins 0.42 \
+m away. The nearest position where the footprint fits is (12.30, 4.70), 0.60 m away.
+    """
+
+    def __init__(
+        self,
+        place: Place,
+        xy: Point,
+        *,
+        clearance: float,
+        needed: float,
+        nearest: Point | None = None,
+        yaw: float | None = None,
     ) -> None:
         self.place, self.xy, self.clearance, self.needed = place, xy, clearance, needed
         self.nearest, self.yaw = nearest, yaw
         super().__init__(
-            f"{format_place(place, xy)}: {footprint_clause(needed, yaw)} overlaps non-free space; "
-            f"the clearance there is {clearance:.2f} m.{nearest_clause(xy, nearest)}"
+            f"{format_place(place, xy)}: {footprint_clause(needed, yaw)} overlaps a keep-out area, "
+            f"which begins {clearance:.2f} m away.{nearest_clause(xy, nearest)}"
         )
 
 
@@ -214,6 +261,8 @@ class EnclosedError(NoRouteError):
         disc within an outline, for planners that plan headings.
     way_out : WayOut, optional
         Where a route could start, if unknown space around the start is all that prevents one.
+    without : tuple of str, default ()
+        What would have to be left out to connect them: "keep_out", "recent", or both.
 
     Examples
     --------
@@ -237,7 +286,9 @@ needs 0.60 m.
         slack: float = 0.0,
         turning: Turning = "none",
         way_out: WayOut | None = None,
+        without: tuple[str, ...] = (),
     ) -> None:
+        self.without = without
         self.place, self.area, self.nearest, self.distance = place, area, nearest, distance
         self.widest_gap, self.needed, self.bottleneck = widest_gap, needed, bottleneck
         self.turning, self.slack, self.way_out = turning, slack, way_out
@@ -245,6 +296,7 @@ needs 0.60 m.
             super().__init__(
                 "no route: a search over one pose per cell and heading found no drivable motion. "
                 "Use a smaller turning radius, a smaller footprint, or a map with smaller cells."
+                f"{without_clause(without)}"
             )
             return
         extent = f"an area of {area:.1f} m²" if len(nearest) == 2 else f"a space of {area:.1f} m³"
@@ -253,6 +305,7 @@ needs 0.60 m.
             f"no route: the {place} is enclosed in {extent}; the reachable cell nearest to the "
             f"goal is {format_point(nearest)}, {distance:.2f} m away.{passage}"
             f"{way_out_clause(way_out)}"
+            f"{without_clause(without)}"
         )
 
 

@@ -10,10 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from groundmap.arrays import Floats, Ints
+from groundmap.grid.cell_set import CellSet
 from planners.costmap.costmap import Costmap, whole_cells
 from planners.costmap.endpoint_check import check_on_map
 from planners.costmap.extent import padded_bounds
 from planners.error_messages import Point
+from planners.errors import ProblemError
 from planners.geometry.rounding import slack_at
 from planners.problem.problem import PlanningProblem
 from planners.route.route import Route
@@ -32,6 +34,10 @@ class IncrementalPlanner:
     ----------
     problem : PlanningProblem
         Its grid is the changing map, its start the first position of the robot.
+    recent : bool, default True
+        Whether each route keeps away from what is there now, the cells that the newest views of
+        the grid's mapper saw as non-free (`groundmap.ConfidenceGrid.recent`). They take the place
+        of ``problem.recent`` if the grid has any.
     **settings
         Settings of `planners.search.dstar_lite.DStarLiteSettings`.
 
@@ -58,14 +64,20 @@ class IncrementalPlanner:
     26.24
     """
 
-    def __init__(self, problem: PlanningProblem, **settings: Any) -> None:
+    def __init__(self, problem: PlanningProblem, *, recent: bool = True, **settings: Any) -> None:
         problem.check_dimensions(2)
+        if not isinstance(recent, bool):
+            raise ProblemError("recent", "True or False", repr(recent))
         self.problem = problem
+        self.recent = recent
         self.settings = DStarLiteSettings(**settings)
         self._costmap: Costmap | None = None
         self._engine: DStarLite | None = None
+        self._took_recent = False  # from the grid
 
-    def update(self, changed: npt.ArrayLike) -> None:
+    def update(
+        self, changed: npt.ArrayLike, *, recent: CellSet | npt.ArrayLike | None = None
+    ) -> None:
         """Register changed cells of the grid; only the affected part of the costmap is updated.
 
         Parameters
@@ -73,13 +85,19 @@ class IncrementalPlanner:
         changed : array_like of int, shape (n, 2)
             Cells [row, col] of the grid, such as `groundmap.GroundMapper.changed`, including
             cells that the map did not have before.
+        recent : CellSet or array_like of int, shape (n, 2), optional
+            What is there now, such as `groundmap.GroundMapper.recent` of a mapper with another
+            grid. From now on it takes the place of what the grid itself has.
 
         Raises
         ------
         ProblemError
-            An array of another shape, or not of integers.
+            An array of another shape, or not of integers; `recent` of another lattice.
         """
         cells = whole_cells(changed)
+        if recent is not None:
+            self.problem = replace(self.problem, recent=recent)
+            self.recent = False
         if self._costmap is not None:
             self._costmap = self._costmap.with_changes(cells)
 
@@ -113,11 +131,15 @@ class IncrementalPlanner:
             to `update`, or the planner has a bug.
         """
         began = now()
-        self.problem = replace(
+        problem = replace(
             self.problem,
             start=self.problem.start if start is None else start,
             goal=self.problem.goal if goal is None else goal,
         )
+        if self.recent and (len(newest := problem.grid.recent) or self._took_recent):
+            problem = replace(problem, recent=newest)
+            self._took_recent = True
+        self.problem = problem
         check_on_map(self.problem)
         costmap = self._costmap = self._costmap_now()
         return solve(costmap, self._engine_on(costmap), self.settings, began=began)
@@ -135,17 +157,27 @@ class IncrementalPlanner:
         if before is None:
             return Costmap.of(self.problem)
         here = replace(before, problem=self.problem)
-        if _ends(before.problem) == _ends(self.problem):
+        moved = _differing(before.problem.recent_set, self.problem.recent_set)
+        if _ends(before.problem) == _ends(self.problem) and len(moved) == 0:
             return here
         now, then = padded_bounds(self.problem), padded_bounds(before.problem)
         if not self.problem.avoids_unknown and (now != then).any():
             return Costmap.of(self.problem)  # cells around the map are traversable, too
         cells = np.concatenate([_unknown_cells(before), _unknown_cells(here)])
-        return here.with_changes(cells + before.lower_cell)
+        return here.with_changes(np.concatenate([cells + before.lower_cell, moved]))
 
 
 def _ends(problem: PlanningProblem) -> tuple[Point, Point]:
     return problem.start_xy, problem.goal_xy
+
+
+def _differing(before: CellSet, after: CellSet) -> Ints:
+    """Return the cells that are in one of two sets, shape (n, 2)."""
+    cells, counts = np.unique(
+        np.concatenate([before.cells, after.cells]), axis=0, return_counts=True
+    )
+    differing: Ints = cells[counts == 1]
+    return differing
 
 
 def _unknown_cells(costmap: Costmap) -> Ints:

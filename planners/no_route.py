@@ -14,6 +14,7 @@ from planners.costmap.endpoint_check import (
     costmap_of,
     find_way_out,
     region_around,
+    space_of,
 )
 from planners.costmap.map_space import MapSpace
 from planners.costmap.regions import nearest_cells
@@ -60,7 +61,29 @@ def explain_no_route(space: MapSpace, *, headings: bool = False) -> EnclosedErro
         slack=LATTICE_SLACK * space.window.resolution,
         turning="planned" if headings else turning,
         way_out=find_way_out(space),
+        without=_separators(problem, radius),
     )
+
+
+def _separators(problem: PlanningProblem, radius: float) -> tuple[str, ...]:
+    """Return what separates start and goal that the map does not know, by the problem's fields."""
+    given = [("keep_out", bool(problem.keep_out_areas)), ("recent", len(problem.recent_set) > 0)]
+    names = tuple(name for name, some in given if some)
+    for without in [*((name,) for name in names), names] if names else ():
+        open_problem = replace(
+            problem,
+            keep_out=None if "keep_out" in without else problem.keep_out,
+            recent=None if "recent" in without else problem.recent,
+        )
+        space = space_of(open_problem)
+        free = space.traversable_for(radius)
+        start, goal = (
+            region_around(space, free, place, radius=radius)
+            for place in (problem.start_xy, problem.goal_xy)
+        )
+        if (start & goal).any():
+            return without
+    return ()
 
 
 def widest_route(problem: PlanningProblem) -> WidestRoute:

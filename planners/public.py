@@ -5,6 +5,7 @@ from planners.errors import (
     AuditError,
     CancelledError,
     EnclosedError,
+    KeepOutError,
     NonFreeError,
     NoRouteError,
     OutsideMapError,
@@ -20,6 +21,8 @@ from planners.no_route import widest_route
 from planners.planning import plan
 from planners.problem.costs import CostSettings
 from planners.problem.footprint import Footprint
+from planners.problem.keep_out import KeepOut
+from planners.problem.keep_out_file import read_keep_out
 from planners.problem.problem import PlanningProblem
 from planners.registry import OWN_PLANNERS, PLANNERS
 from planners.route.route import Route
@@ -55,6 +58,8 @@ __all__ = [
     "IncrementalPlanner",
     "JPSPlusSettings",
     "JPSSettings",
+    "KeepOut",
+    "KeepOutError",
     "LazyThetaSettings",
     "NoRouteError",
     "NonFreeError",
@@ -80,6 +85,7 @@ __all__ = [
     "plan",
     "plan_many",
     "reachable",
+    "read_keep_out",
     "shortcut",
     "smooth",
     "widest_route",

@@ -9,7 +9,14 @@ from groundmap.draw.case import draw_case
 from groundmap.draw.curves import curves_png, draw_curves
 from groundmap.draw.figure import check_picture, figure_png, new_figure, save_figure
 from groundmap.draw.graphs import draw_graph
-from groundmap.draw.maps import draw_grid, draw_trajectory, draw_verdicts, known_bounds
+from groundmap.draw.maps import (
+    draw_cells,
+    draw_grid,
+    draw_keep_out,
+    draw_trajectory,
+    draw_verdicts,
+    known_bounds,
+)
 from groundmap.draw.routes import draw_route, draw_routes
 from groundmap.draw.truth import draw_difference, draw_truth
 from groundmap.draw.views import draw_view
@@ -19,10 +26,12 @@ __all__ = [
     "check_picture",
     "curves_png",
     "draw_case",
+    "draw_cells",
     "draw_curves",
     "draw_difference",
     "draw_graph",
     "draw_grid",
+    "draw_keep_out",
     "draw_route",
     "draw_routes",
     "draw_trajectory",

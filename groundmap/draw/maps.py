@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
+import shapely
 
 from groundmap.arrays import Floats, as_floats, as_number, check_finite
 from groundmap.draw.figure import add_to_legend, new_figure, scale_bar
 from groundmap.errors import InputError
+from groundmap.grid.cell_set import CellSet
 from groundmap.grid.grid import ConfidenceGrid
 from groundmap.grid.window import EPSILON, CellState, GridWindow
 
@@ -33,6 +36,7 @@ LABELS = {
 #: Cells of a picture by dimension. In 2-D, each takes about 50 bytes, and no screen shows more.
 MOST_DRAWN = {2: 2**25, 3: 2**27}
 TRAJECTORY = "#1f5f8b"
+NOW, KEEP_OUT = "#e8542f", "#7b1fa2"
 
 
 def known_bounds(grid: ConfidenceGrid, *, margin: float = 1.0) -> Floats:
@@ -162,6 +166,55 @@ def draw_trajectory(poses: npt.ArrayLike, *, ax: Axes) -> list[Artist]:
     )  # fmt: skip
     add_to_legend(ax, [line])
     return [line, start, arrows]
+
+
+def draw_cells(cells: CellSet, *, label: str, color: str = NOW, ax: Axes) -> list[Artist]:
+    """Draw cells in one colour, such as those that the newest views saw as non-free.
+
+    Parameters
+    ----------
+    cells : CellSet
+        Of a 2-D map.
+    label : str
+        Name in the legend.
+    color : str, optional
+        A colour of matplotlib.
+    ax : matplotlib Axes
+    """
+    from matplotlib.collections import PolyCollection
+    from matplotlib.patches import Patch
+
+    if len(cells) == 0:
+        return []
+    corners = cells.origin + cells.cells[:, ::-1] * cells.resolution
+    square = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]) * cells.resolution
+    squares = PolyCollection(list(corners[:, None] + square), facecolor=color, zorder=1.5)
+    ax.add_collection(squares, autolim=False)
+    add_to_legend(ax, [Patch(facecolor=color, label=label)])
+    return [squares]
+
+
+def draw_keep_out(areas: Sequence[shapely.Polygon], *, ax: Axes) -> list[Artist]:
+    """Draw keep-out areas, hatched.
+
+    Parameters
+    ----------
+    areas : sequence of shapely.Polygon [m, map]
+    ax : matplotlib Axes
+    """
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    artists: list[Artist] = []
+    for area in areas:
+        rings = [np.asarray(ring.coords)[:, :2] for ring in (area.exterior, *area.interiors)]
+        path = Path.make_compound_path(*(Path(ring, closed=True) for ring in rings))
+        patch = PathPatch(path, zorder=1.8, label="keep-out area")
+        patch.set(facecolor="none", edgecolor=KEEP_OUT, linewidth=1.0, hatch="////")
+        artists.append(ax.add_patch(patch))
+    if artists:
+        add_to_legend(ax, artists[:1])
+    return artists
 
 
 def draw_verdicts(

@@ -7,13 +7,14 @@ different settings can be compared.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from groundmap.arrays import Bools, Bytes, Floats, Ints
+from groundmap.evaluate.figures import Tally
+from groundmap.evaluate.landmark_kinds import LandmarkKinds
 from groundmap.grid.grid import ConfidenceGrid
 from groundmap.grid.window import CellState, GridWindow
 from groundmap.view.view import View
@@ -22,6 +23,8 @@ JUDGED_RANGE = 15.0  # [m], farther features are left out
 GROUND_HEIGHT = 0.10  # [m], distance of ground features from the plane: less than a kerb
 OBSTACLE_HEIGHTS = (0.30, 1.80)  # [m], lowest and highest obstacle
 NEAR = 0.3  # [m], distance from a non-free cell within which an obstacle counts as mapped
+SWEPT = 0.8  # [m], half the width of the band that a robot sweeps along the trajectory
+UNSEEN_START = 5.0  # [m] of the trajectory, which a forward camera does not see from its start
 CELLS_AT_ONCE = 2**19  # cells of about 100 bytes that `cells_around` holds in memory
 END_OF_SIGHT = 0.3  # [m], the end of a sight line, which is not judged
 
@@ -32,6 +35,12 @@ class HeldOut(NamedTuple):
     obstacles: Floats  #: shape (n, 2) [m, map]
     grounds: Floats  #: shape (k, 2) [m, map], ground features
     viewpoints: Floats  #: shape (k, 2) [m, map], the camera position for each ground feature
+    ids: Ints | None = None  #: shape (n,), landmarks of the obstacles
+
+    @property
+    def obstacle_ids(self) -> Ints:
+        """Landmarks of the obstacles; -1 where they are not known."""
+        return np.full(len(self.obstacles), -1) if self.ids is None else self.ids
 
 
 def sort_by_height(views: Iterable[View]) -> HeldOut:
@@ -40,16 +49,17 @@ def sort_by_height(views: Iterable[View]) -> HeldOut:
     Features farther than 15 m from the camera are left out, as are views without a ground plane.
     """
     rows = list(_sort(views))
-    obstacles, grounds, viewpoints = zip(*rows, strict=True) if rows else ((), (), ())
+    obstacles, grounds, viewpoints, ids = zip(*rows, strict=True) if rows else ((), (), (), ())
     none = np.empty((0, 2))
     return HeldOut(
         np.concatenate([none, *obstacles]),
         np.concatenate([none, *grounds]),
         np.concatenate([none, *viewpoints]),
+        np.concatenate([np.empty(0, dtype=np.int64), *ids]),
     )
 
 
-def _sort(views: Iterable[View]) -> Iterator[tuple[Floats, Floats, Floats]]:
+def _sort(views: Iterable[View]) -> Iterator[tuple[Floats, Floats, Floats, Ints]]:
     for view in views:
         if view.plane is None:
             continue
@@ -59,78 +69,18 @@ def _sort(views: Iterable[View]) -> Iterator[tuple[Floats, Floats, Floats]]:
         xy = xyz @ T_map_camera[:2, :3].T + T_map_camera[:2, 3]
         near = np.hypot(*(xy - T_map_camera[:2, 3]).T) <= JUDGED_RANGE
         lowest, highest = OBSTACLE_HEIGHTS
-        obstacles = xy[near & (lowest <= height) & (height <= highest)]
+        obstacle = near & (lowest <= height) & (height <= highest)
         grounds = xy[near & (np.abs(height) <= GROUND_HEIGHT)]
-        yield obstacles, grounds, np.tile(T_map_camera[:2, 3], (len(grounds), 1))
+        viewpoints = np.tile(T_map_camera[:2, 3], (len(grounds), 1))
+        yield xy[obstacle], grounds, viewpoints, view.points.ids[obstacle]
 
 
-@dataclass(frozen=True)
-class Figures:
-    """Agreement of maps with held-out features: shares from 0 to 1, pooled over the five folds."""
-
-    obstacle_near_nonfree: float  #: share of obstacles within 0.3 m of a non-free cell
-    obstacle_in_free: float  #: share of obstacles in free cells
-    obstacle_unknown: float  #: share of obstacles in unknown or contested cells
-    ground_free: float  #: share of ground features in free cells
-    ground_nonfree: float  #: share of ground features in non-free cells
-    ground_unknown: float  #: share of ground features in unknown or contested cells
-    sightline_free: float  #: share of the length of sight lines to ground features in free cells
-    sightline_crosses_nonfree: float  #: share of these lines that cross a non-free cell
-    trajectory_free: float  #: share of free cells on the trajectory, from its first known cell
-    trajectory_nonfree: float  #: share of non-free cells on the same part of the trajectory
-    trajectory_unseen_start_m: float  #: [m], trajectory before its first known cell, mean of folds
-    obstacles: int  #: number of obstacles
-    grounds: int  #: number of ground features
-
-
-class Tally(NamedTuple):
-    """Sums behind the `Figures`; the tallies of several folds are added field by field."""
-
-    obstacles: float = 0
-    near_nonfree: float = 0
-    in_free: float = 0
-    obstacles_unknown: float = 0
-    grounds: float = 0
-    grounds_free: float = 0
-    grounds_nonfree: float = 0
-    grounds_unknown: float = 0
-    sight_m: float = 0
-    sight_free_m: float = 0
-    crossings: float = 0
-    driven: float = 0
-    driven_free: float = 0
-    driven_nonfree: float = 0
-    unseen_start_m: float = 0
-    maps: float = 0
-
-    def plus(self, other: Tally) -> Tally:
-        """Return the field-wise sum of two tallies."""
-        return Tally(*(a + b for a, b in zip(self, other, strict=True)))
-
-    def figures(self) -> Figures:
-        """Return the figures; shares without any data are 0."""
-
-        def share(part: float, whole: float) -> float:
-            return part / whole if whole else 0.0
-
-        return Figures(
-            obstacle_near_nonfree=share(self.near_nonfree, self.obstacles),
-            obstacle_in_free=share(self.in_free, self.obstacles),
-            obstacle_unknown=share(self.obstacles_unknown, self.obstacles),
-            ground_free=share(self.grounds_free, self.grounds),
-            ground_nonfree=share(self.grounds_nonfree, self.grounds),
-            ground_unknown=share(self.grounds_unknown, self.grounds),
-            sightline_free=share(self.sight_free_m, self.sight_m),
-            sightline_crosses_nonfree=share(self.crossings, self.grounds),
-            trajectory_free=share(self.driven_free, self.driven),
-            trajectory_nonfree=share(self.driven_nonfree, self.driven),
-            trajectory_unseen_start_m=share(self.unseen_start_m, self.maps),
-            obstacles=int(self.obstacles),
-            grounds=int(self.grounds),
-        )
-
-
-def judge(grid: ConfidenceGrid, held_out: HeldOut, trajectory: Floats) -> Tally:
+def judge(
+    grid: ConfidenceGrid,
+    held_out: HeldOut,
+    trajectory: Floats,
+    kinds: LandmarkKinds | None = None,
+) -> Tally:
     """Return the tally of a map against held-out features.
 
     Parameters
@@ -139,11 +89,17 @@ def judge(grid: ConfidenceGrid, held_out: HeldOut, trajectory: Floats) -> Tally:
     held_out : HeldOut
     trajectory : ndarray, shape (n, 2) [m, map]
         Positions of the base, which drove through free space.
+    kinds : LandmarkKinds, optional
+        Landmarks whose figures are stated apart, too.
     """
     window = grid.window()
     states = window.states()
     at_obstacle = _states_at(window, states, held_out.obstacles)
     at_ground = _states_at(window, states, held_out.grounds)
+    near = near_nonfree(window, states, held_out.obstacles)
+    moving, thin = _of_kinds(held_out, kinds)
+    in_free = at_obstacle == CellState.FREE
+    swept = _swept(window, states, trajectory)
     sight_m, sight_free_m, crossings = _sight_lines(window, states, held_out)
     driven = _along(window, trajectory)
     known = np.flatnonzero(_states_at(window, states, driven) != CellState.UNKNOWN)
@@ -152,8 +108,8 @@ def judge(grid: ConfidenceGrid, held_out: HeldOut, trajectory: Floats) -> Tally:
     on_cells = _states_at(window, states, window.cell_to_world(cells))
     return Tally(
         obstacles=len(at_obstacle),
-        near_nonfree=near_nonfree(window, states, held_out.obstacles).sum(),
-        in_free=(at_obstacle == CellState.FREE).sum(),
+        near_nonfree=near.sum(),
+        in_free=in_free.sum(),
         obstacles_unknown=_is_unknown(at_obstacle).sum(),
         grounds=len(at_ground),
         grounds_free=(at_ground == CellState.FREE).sum(),
@@ -167,7 +123,37 @@ def judge(grid: ConfidenceGrid, held_out: HeldOut, trajectory: Floats) -> Tally:
         driven_nonfree=(on_cells == CellState.NONFREE).sum(),
         unseen_start_m=float(np.hypot(*np.diff(driven[: first + 1], axis=0).T).sum()),
         maps=1,
+        swept=len(swept),
+        swept_free=(swept == CellState.FREE).sum(),
+        swept_nonfree=(swept == CellState.NONFREE).sum(),
+        moving=moving.sum(),
+        moving_in_free=(moving & in_free).sum(),
+        moving_near=(moving & near).sum(),
+        thin=thin.sum(),
+        thin_in_free=(thin & in_free).sum(),
+        thin_near=(thin & near).sum(),
     )
+
+
+def _of_kinds(held_out: HeldOut, kinds: LandmarkKinds | None) -> tuple[Bools, Bools]:
+    """Return which obstacles move, and which have few landmarks around them."""
+    if kinds is None or held_out.ids is None:
+        none = np.zeros(len(held_out.obstacles), dtype=np.bool_)
+        return none, none
+    return np.isin(held_out.ids, kinds.moving), np.isin(held_out.ids, kinds.thin)
+
+
+def _swept(window: GridWindow, states: Bytes, trajectory: Floats) -> Bytes:
+    """Return the states of the cells within `SWEPT` of the trajectory beyond `UNSEEN_START`."""
+    points = _along(window, trajectory)
+    driven = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
+    points = points[driven >= UNSEEN_START]
+    none = np.empty((0, 2), dtype=np.int64)
+    parts = [none]
+    for cells, distances in cells_around(window, points, SWEPT, to_centre=True):
+        parts.append(np.unique(cells[distances <= SWEPT], axis=0))
+    cells = np.unique(np.concatenate(parts), axis=0)
+    return _states_at(window, states, window.cell_to_world(cells))
 
 
 def _is_unknown(states: Bytes) -> Bools:

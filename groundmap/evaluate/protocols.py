@@ -13,7 +13,9 @@ import numpy as np
 
 from groundmap.arrays import Bools, Ints
 from groundmap.errors import InputError
-from groundmap.evaluate.held_out import Figures, HeldOut, Tally, cells_around, judge, sort_by_height
+from groundmap.evaluate.figures import Figures, Tally
+from groundmap.evaluate.held_out import HeldOut, cells_around, judge, sort_by_height
+from groundmap.evaluate.landmark_kinds import kinds_of
 from groundmap.grid.grid import ConfidenceGrid
 from groundmap.mapper import GroundMapper
 from groundmap.view.ground_fit import fit_ground
@@ -81,6 +83,8 @@ def evaluate(
     ground = {**(ground or {}), "camera_height": camera_height}
     _check_log(given)
     trajectory = np.array([view.T_map_base[:2, 3] for view in given])
+    everything = [sort_by_height([view]) for view in given]
+    kinds = kinds_of(given, [(each.obstacles, each.obstacle_ids) for each in everything])
     tallies = dict.fromkeys(PROTOCOLS, Tally())
     verdicts = {}
     for name, fold in watch([(name, fold) for name in PROTOCOLS for fold in range(FOLDS)]):
@@ -88,7 +92,7 @@ def evaluate(
         parts = [split(fold, number, view) for number, view in enumerate(given)]
         grid = make_map((view for view, _ in parts if view is not None), settings, ground)
         held_out = sort_by_height(view for _, view in parts if view is not None)
-        tallies[name] = tallies[name].plus(judge(grid, held_out, trajectory))
+        tallies[name] = tallies[name].plus(judge(grid, held_out, trajectory, kinds))
         verdicts[name] = Verdict(tallies[name].figures(), grid, held_out)
     return verdicts
 

@@ -18,10 +18,12 @@ from groundmap.grid.arguments import (
     check_frame,
     check_merge,
 )
+from groundmap.grid.cell_set import CellSet
 from groundmap.grid.extents import cells_of_box, check_size, check_whole
 from groundmap.grid.fusion import Average, UpdateRule
 from groundmap.grid.grid_files import GridContent, read_grid, write_grid
 from groundmap.grid.height_layers import SIGHT_HEIGHTS, HeightLayers, as_heights
+from groundmap.grid.recent_views import RecentViews
 from groundmap.grid.tiles import Index, Tile, Tiles
 from groundmap.grid.window import CellBox, CellState, GridWindow, cells_of
 
@@ -72,6 +74,9 @@ class ConfidenceGrid:
         self.resolution, self.origin = as_resolution(resolution), as_origin(origin)
         self._tiles = Tiles(len(origin))
         self._layers = HeightLayers(len(origin), heights)
+        #: The newest views, see `recent`; not saved, copied or merged.
+        self.recent_views = RecentViews()
+        self._saved_recent: Ints = np.empty((0, len(origin)), dtype=np.int64)
         #: Base poses of the views, shape (n, 3): x, y [m], yaw [rad], in the map frame.
         self.trajectory: Floats = np.empty((0, 3))
 
@@ -125,6 +130,24 @@ class ConfidenceGrid:
         cells = cells_of(xy, self.origin, self.resolution)
         values: Counts = self._tiles.values_at(cells, "count")
         return int(values[0]) if np.ndim(xy) == 1 else values
+
+    @property
+    def recent(self) -> CellSet:
+        """What is there now: the cells that the newest views saw as non-free.
+
+        The average of many views remembers the empty road under a car that has just come. On a
+        loaded map, what was there when it was saved. A merged map has none.
+        """
+        cells = self._saved_recent
+        if self.recent_views.held:
+            cells = self.recent_views.cells(self._confidence, self.resolution, self.origin)
+        return CellSet(cells, self.resolution, self.origin)
+
+    def _confidence(self, lower: Ints, upper: Ints) -> Floats32:
+        """Return the confidence of the cells from `lower` up to `upper`."""
+        confidence = self._tiles.read(lower, upper).confidence
+        self._layers.raise_confidence(confidence, lower, upper)
+        return confidence
 
     def cell_bounds(self) -> tuple[Ints, Ints]:
         """Return the first cell of the observed tiles and the cell past the last."""
@@ -283,7 +306,9 @@ class ConfidenceGrid:
         OSError
             The folder does not exist or is not writable.
         """
-        content = GridContent(self._settings(), self._tiles, self._layers, self.trajectory)
+        content = GridContent(
+            self._settings(), self._tiles, self._layers, self.trajectory, self.recent.cells
+        )
         write_grid(path, content)
 
     @classmethod
@@ -299,6 +324,7 @@ class ConfidenceGrid:
         grid = cls(**content.settings)
         grid._tiles, grid._layers = content.tiles, content.layers
         grid.trajectory = content.trajectory
+        grid._saved_recent = content.recent
         return grid
 
     def _settings(self) -> dict[str, Any]:

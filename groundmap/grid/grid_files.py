@@ -5,7 +5,7 @@ from __future__ import annotations
 from os import PathLike
 from typing import Any, NamedTuple
 
-from groundmap.arrays import Floats, as_floats, check_finite
+from groundmap.arrays import Floats, Ints, as_cells, as_floats, check_finite
 from groundmap.errors import FileFormatError
 from groundmap.files.archive import read_archive, write_archive
 from groundmap.grid.arguments import as_origin, as_resolution, check_frame
@@ -24,6 +24,7 @@ class GridContent(NamedTuple):
     tiles: Tiles
     layers: HeightLayers
     trajectory: Floats  #: shape (n, 3): x, y [m], yaw [rad], in the map frame
+    recent: Ints  #: shape (n, d), cells that the newest views saw as non-free
 
 
 def write_grid(path: str | PathLike[str], content: GridContent) -> None:
@@ -51,6 +52,7 @@ def write_grid(path: str | PathLike[str], content: GridContent) -> None:
         **content.tiles.to_arrays(),
         **content.layers.to_arrays(),
         "trajectory": content.trajectory,
+        "recent": content.recent,
     }
     write_archive(path, header, arrays)
 
@@ -76,6 +78,7 @@ def read_grid(path: str | PathLike[str]) -> GridContent:
         layers = HeightLayers.from_arrays(ndim, settings["heights"], arrays)
         trajectory = as_floats("trajectory", arrays["trajectory"], (None, 3))
         check_finite("trajectory", trajectory)
+        recent = as_cells("recent", arrays["recent"], ndim)
     except (KeyError, TypeError, ValueError) as error:
         raise FileFormatError(path, "a complete map file", f"{error}") from error
-    return GridContent(settings, tiles, layers, trajectory)
+    return GridContent(settings, tiles, layers, trajectory, recent)

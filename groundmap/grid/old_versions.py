@@ -52,6 +52,7 @@ def upgrade(header: Header, arrays: Arrays) -> tuple[Header, Arrays]:
         "tiles_0": indices[some],
         "confidence_0": (count[some] > 0).astype(np.float32),
         "count_0": count[some],
+        "recent": indices[:0],
     }
     for number in range(1, len(SIGHT_HEIGHTS)):
         upgraded[f"tiles_{number}"] = indices[:0]

@@ -94,15 +94,14 @@ class Tiles:
             Cell of the block's first entry.
         block : ndarray of float32
         """
-        upper = lower + block.shape
-        first, last = lower // self.shape, (upper - 1) // self.shape
-        for offset in np.ndindex(*(last - first + 1).tolist()):
-            index = first + offset
-            here, there = self._overlap(index, lower, upper)
-            if block[there].any():
+        axes = map(_pieces, lower.tolist(), block.shape, self.shape)
+        for pieces in itertools.product(*axes):
+            index, here, there = zip(*pieces, strict=True)
+            seen = block[there]
+            if seen.any():
                 part = np.zeros(self.shape, dtype=np.float32)
-                part[here] = block[there]
-                yield self.touch(tuple(index.tolist())), part
+                part[here] = seen
+                yield self.touch(index), part
 
     def read(self, lower: Ints, upper: Ints) -> Tile:
         """Return the cells of a box as dense arrays; zeros where no tile exists.
@@ -241,6 +240,24 @@ class Tiles:
         in_tile = tuple(map(slice, start - corner, stop - corner))
         in_box = tuple(map(slice, start - lower, stop - lower))
         return in_tile, in_box
+
+
+def _pieces(lower: int, length: int, side: int) -> list[tuple[int, slice, slice]]:
+    """Cut a range of cells along the tiles: index of the tile, slice of it, slice of the range.
+
+    Parameters
+    ----------
+    lower, length : int [cells]
+        First cell and length of the range.
+    side : int [cells]
+        Of a tile.
+    """
+    pieces = []
+    for index in range(lower // side, (lower + length - 1) // side + 1):
+        start, stop = max(lower, index * side), min(lower + length, (index + 1) * side)
+        here = slice(start - index * side, stop - index * side)
+        pieces.append((index, here, slice(start - lower, stop - lower)))
+    return pieces
 
 
 def _beyond_widest_gap(indices: Ints) -> Bools | None:

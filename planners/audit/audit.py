@@ -5,12 +5,22 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import shapely
 from scipy.spatial import cKDTree
 
-from groundmap.arrays import Bools, Floats, Ints
-from groundmap.grid.window import CellState
-from planners.audit.obstacles import TOLERANCE, Obstacles, gaps, lengths, segment_boxes
-from planners.audit.swept_audit import swept_audit
+from groundmap.arrays import Bools, Bytes, Floats, Ints
+from groundmap.grid.window import CellState, GridWindow
+from planners.audit.keep_out_audit import audit_keep_out
+from planners.audit.obstacles import (
+    KEEP_OUT,
+    RECENT,
+    TOLERANCE,
+    Obstacles,
+    gaps,
+    lengths,
+    segment_boxes,
+)
+from planners.audit.swept_audit import SweptObstacles, swept_audit
 from planners.errors import AuditError
 from planners.problem.problem import PlanningProblem
 
@@ -25,6 +35,8 @@ def audit(problem: PlanningProblem, waypoints: Floats, *, headings: Floats | Non
     The distance from the line to every cell that the footprint must not touch (its square; on a
     3-D map its cube) is at least the footprint's radius, up to a nanometre, and the line enters no
     such cell. `obstacles_near` defines these cells.
+
+    The same holds for the polygons of keep-out areas themselves.
 
     With headings, a polygon footprint is swept along the poses instead of the disc around it, and
     must not enter such a cell by more than a nanometre.
@@ -57,13 +69,16 @@ def audit(problem: PlanningProblem, waypoints: Floats, *, headings: Floats | Non
     _check_ends(problem, waypoints, headings)
     tolerance = TOLERANCE + 4.0 * float(np.spacing(np.abs(waypoints).max()))
     pieces = _pieces_of(waypoints, PIECE * problem.grid.resolution)
+    audit_keep_out(problem, waypoints, headings, tolerance)
     obstacles = obstacles_near(problem, pieces, tolerance)
     if len(obstacles.states) == 0:
         return
     if headings is None or problem.shape.polygon is None:
         _check_distance(problem.radius, pieces, obstacles, tolerance)
     else:
-        swept_audit(problem.shape.polygon, waypoints, headings, obstacles, tolerance)
+        squares = shapely.box(*obstacles.lower.T, *obstacles.upper.T)
+        areas = SweptObstacles(squares, obstacles.name)
+        swept_audit(problem.shape.polygon, waypoints, headings, areas, tolerance)
 
 
 def _check_ends(problem: PlanningProblem, waypoints: Floats, headings: Floats | None) -> None:
@@ -141,9 +156,10 @@ def obstacles_near(
 
     A cell near several parts of a long line may be returned more than once.
 
-    These are the non-free cells and, where the problem avoids unknown space, the unknown and
-    contested ones, including everything outside the map and excluding unknown cells near the start
-    that `PlanningProblem.clear_start` clears.
+    These are the non-free cells, those that the newest views saw as non-free, those that are kept
+    out and, where the problem avoids unknown space, the unknown and contested ones, including
+    everything outside the map and excluding unknown cells near the start that
+    `PlanningProblem.clear_start` clears.
 
     Parameters
     ----------
@@ -170,6 +186,7 @@ def obstacles_near(
     for box in boxes[differ].reshape(-1, 2, near.ndim):
         near[tuple(map(slice, *box.tolist()))] = True
     states = window.states(epsilon=problem.epsilon)
+    _impose(problem, window, states)
     cells = np.argwhere(near & (states != CellState.FREE))
     lower = window.origin + cells[:, ::-1] * window.resolution
     upper = window.origin + (cells[:, ::-1] + 1) * window.resolution
@@ -178,11 +195,18 @@ def obstacles_near(
     return Obstacles(lower[kept], upper[kept], obstacles.states[kept])
 
 
+def _impose(problem: PlanningProblem, window: GridWindow, states: Bytes) -> None:
+    """Mark the cells that are not to be entered whatever the map says, in place."""
+    for which, state in ((problem.recent_set, RECENT), (problem.keep_out_areas.cells, KEEP_OUT)):
+        if len(which):
+            cells = window.world_to_cell(which.centres())
+            states[tuple(cells[window.contains(cells)].T)] = state
+
+
 def _forbidden(problem: PlanningProblem, cells: Obstacles, tolerance: float) -> Bools:
     """Return which cells that are not free the footprint must not touch."""
     if not problem.avoids_unknown:
-        nonfree: Bools = cells.states == CellState.NONFREE
-        return nonfree
+        return np.isin(cells.states, (CellState.NONFREE, RECENT, KEEP_OUT))
     if not problem.clear_start:
         return np.ones(len(cells.states), dtype=np.bool_)
     away = lengths(gaps(np.array(problem.clear_place), cells.lower, cells.upper))

@@ -10,10 +10,13 @@ from groundmap.arrays import Bytes, Floats
 from groundmap.grid.window import CellState
 
 TOLERANCE = 1e-9  # [m]
-NAMES = {
+RECENT, KEEP_OUT = 100, 101  # instead of a `CellState`, where the map has no say
+NAMES: dict[int, str] = {
     CellState.NONFREE: "a non-free cell",
     CellState.UNKNOWN: "an unknown cell",
     CellState.CONTESTED: "a contested cell",
+    RECENT: "a cell that the newest views saw as non-free",
+    KEEP_OUT: "a keep-out cell",
 }
 
 
@@ -22,11 +25,11 @@ class Obstacles(NamedTuple):
 
     lower: Floats  #: shape (n, d) [m, map]: lower corners
     upper: Floats  #: shape (n, d) [m, map]: upper corners
-    states: Bytes  #: shape (n,)
+    states: Bytes  #: shape (n,), a `CellState`, `RECENT` or `KEEP_OUT`
 
     def name(self, index: int) -> str:
         """Return what a cell is called in messages."""
-        return NAMES[CellState(int(self.states[index]))]
+        return NAMES[int(self.states[index])]
 
 
 def segment_boxes(a: Floats, b: Floats, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy.typing as npt
 import shapely
 
 from groundmap.arrays import Floats
-from planners.audit.obstacles import TOLERANCE, Obstacles
+from planners.audit.obstacles import TOLERANCE
 from planners.errors import AuditError
 
 MITRE = 5.0  # [bulges] sharp corners of grown areas are cut off at this distance
@@ -22,8 +23,19 @@ class SweptHulls(NamedTuple):
     bulges: Floats  #: shape (n,): how far a turn moves a corner out of its hull [m]
 
 
+class SweptObstacles(NamedTuple):
+    """Areas that a polygon must not enter."""
+
+    areas: npt.NDArray[np.object_]  #: shape (n,): polygons of shapely [m, map]
+    name: Callable[[int], str]  #: what one is called in messages, by its index
+
+
 def swept_audit(
-    polygon: Floats, waypoints: Floats, headings: Floats, obstacles: Obstacles, tolerance: float
+    polygon: Floats,
+    waypoints: Floats,
+    headings: Floats,
+    obstacles: SweptObstacles,
+    tolerance: float,
 ) -> None:
     """Check that a polygon, moved along poses, enters no obstacle.
 
@@ -32,7 +44,7 @@ def swept_audit(
     polygon : ndarray, shape (n, 2) [m, base_link]
     waypoints : ndarray, shape (m, 2) [m, map]
     headings : ndarray, shape (m,) [rad, map]
-    obstacles : Obstacles
+    obstacles : SweptObstacles
     tolerance : float [m]
         Overlap that is attributed to rounding.
 
@@ -40,7 +52,7 @@ def swept_audit(
     ------
     AuditError
     """
-    squares = shapely.box(*obstacles.lower.T, *obstacles.upper.T)
+    squares = obstacles.areas
     swept = swept_hulls(polygon, waypoints, headings)
     # Growing hulls takes most of the time, so only those near a square are grown. A mitre that is
     # cut off ends in an edge, whose ends are farther out than its middle.

@@ -22,6 +22,7 @@ from planners.commands.console import (
     show_progress,
     show_waiting,
 )
+from planners.commands.imposed import Imposed, KeepOutOption, RecentOption, imposed
 from planners.commands.options import assignments, outline
 from planners.commands.plot import draw_map, draw_voxels
 from planners.errors import NoRouteError, ProblemError
@@ -91,6 +92,8 @@ def plan_command(
         float | None,
         typer.Option(help="Distance from the start of unknown cells that are free [m]."),
     ] = None,
+    recent: RecentOption = False,
+    keep_out: KeepOutOption = None,
     clearance_weight: Annotated[
         float, typer.Option(help="Extra cost per metre of a route that touches obstacles [m/m].")
     ] = PLAIN.clearance_weight,
@@ -130,14 +133,18 @@ def plan_command(
         raise typer.BadParameter(f"{options} are for one planner, not {ALL}")
     if inflation_radius != PLAIN.inflation_radius and clearance_weight == 0:
         raise typer.BadParameter("--inflation-radius needs a --clearance-weight above 0")
+    grid = _load_map(map_file, draws=plot is not None)
+    areas = imposed(recent=recent, keep_out=keep_out, grid=grid)
     problem = PlanningProblem(
-        _load_map(map_file, draws=plot is not None),
+        grid,
         start=numbers("start", start, 2, 3),
         goal=numbers("goal", goal, 2, 3),
         footprint=outline(footprint),
         unknown=cast(Unknown, unknown),  # other values raise in PlanningProblem
         clear_start=clear_start,
         clear_start_radius=clear_start_radius,
+        recent=areas.recent,
+        keep_out=areas.keep_out,
         costs=CostSettings(
             clearance_weight=clearance_weight,
             inflation_radius=inflation_radius,
@@ -198,7 +205,12 @@ def _draw(problem: PlanningProblem, route: Route, graph: Graph | None, plot: Pat
         footprint=problem.shape.to_value(),
         headings=route.headings,
         graph=graph,
+        areas=_areas_of(problem),
     )
+
+
+def _areas_of(problem: PlanningProblem) -> Imposed:
+    return Imposed(problem.recent_set, list(problem.keep_out_areas.areas))
 
 
 def _compare(
@@ -223,7 +235,7 @@ def _compare(
         if problem.grid.ndim == 3:
             draw_voxels(problem.grid, plot, routes=lines, footprint=problem.radius)
         else:
-            draw_map(problem.grid, plot, lines=lines)
+            draw_map(problem.grid, plot, lines=lines, areas=_areas_of(problem))
     if as_json:
         by_name = {name: route.to_dict() for name, route in routes.items()}
         emit({"routes": by_name, "refused": refused}, as_json=True, title=title)

@@ -17,6 +17,7 @@ from groundmap.errors import FileFormatError, InputError
 from groundmap.files.documents import read_json
 from groundmap.io import files_of, load_map
 from planners.commands.console import JsonOption, emit, numbers
+from planners.commands.imposed import Imposed, KeepOutOption, RecentOption, imposed
 from planners.commands.settings_file import ConfigOption, read_settings
 from planners.commands.sources import (
     CameraHeightOption,
@@ -58,6 +59,8 @@ def plot_command(
         ),
     ] = None,
     route: Annotated[Path | None, typer.Option(help="Route to draw: GeoJSON of `plan`.")] = None,
+    recent: RecentOption = False,
+    keep_out: KeepOutOption = None,
     footprint: Annotated[float, typer.Option(help="Radius to draw along the route [m].")] = 0.0,
     height: Annotated[
         float | None,
@@ -87,7 +90,8 @@ def plot_command(
         routes = {} if waypoints is None else {"route": waypoints}
         draw_voxels(grid, picture, bounds=box, height=height, routes=routes, footprint=footprint)
     else:
-        draw_map(grid, picture, bounds=box, waypoints=waypoints, footprint=footprint)
+        areas = imposed(recent=recent, keep_out=keep_out, grid=grid)
+        draw_map(grid, picture, bounds=box, waypoints=waypoints, footprint=footprint, areas=areas)
     emit({"out": str(picture)}, as_json=as_json, title=f"picture of {map_file}")
 
 
@@ -117,15 +121,21 @@ def draw_map(
     headings: Floats | None = None,
     lines: Mapping[str, Floats] | None = None,
     graph: Graph | None = None,
+    areas: Imposed | None = None,
 ) -> None:
     """Draw a map, its trajectory, and a route or several named lines, to a file.
 
-    The graph is the tree or roadmap of a sampling planner; it is drawn below the route.
+    The graph is the tree or roadmap of a sampling planner; it is drawn below the route, as are
+    the areas that are not to be entered.
     """
     box = draw.known_bounds(grid) if bounds is None else bounds
     figure, axes = draw.new_figure(box)
     draw.draw_grid(grid, bounds=box, ax=axes)
     draw.draw_trajectory(grid.trajectory, ax=axes)
+    if areas is not None:
+        if areas.recent is not None:
+            draw.draw_cells(areas.recent, label="seen by the newest views", ax=axes)
+        draw.draw_keep_out(areas.keep_out, ax=axes)
     if graph is not None:
         draw.draw_graph(graph.vertices[:, :2], graph.edges, ax=axes)
     if waypoints is not None:

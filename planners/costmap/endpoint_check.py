@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import partial
 from itertools import product
+from typing import TypeAlias
 
 import numpy as np
 from scipy import ndimage
@@ -17,13 +19,22 @@ from planners.costmap.map_space import MapSpace
 from planners.costmap.regions import connected_to, largest_region, nearest_cells
 from planners.costmap.voxel_map import Voxels
 from planners.error_messages import Place, Point, WayOut, format_point
-from planners.errors import NonFreeError, OutsideMapError, ProblemError, UnknownSpaceError
+from planners.errors import (
+    KeepOutError,
+    NonFreeError,
+    NoRouteError,
+    OutsideMapError,
+    ProblemError,
+    UnknownSpaceError,
+)
 from planners.geometry.kernels.swept_footprint import pose_clear
 from planners.geometry.rounding import rounding_at, slack_at
 from planners.problem.problem import PlanningProblem, Pose
 
 SPACES: dict[int, type[Costmap | Voxels]] = {2: Costmap, 3: Voxels}  # by dimension of the map
 FARTHEST_OUT = 10.0  # [m], from the start to a place that the same drive saw
+#: Cells of one kind, and the error of an end whose footprint overlaps them.
+Cause: TypeAlias = tuple[Bools, Callable[..., NoRouteError]]
 MOST_LOOKUPS = 64  # tiles near a place above which all observed tiles are searched instead
 
 
@@ -90,7 +101,7 @@ def check_space(space: MapSpace, place: Place, pose: Pose, *, headings: bool = F
 
     Raises
     ------
-    NonFreeError, UnknownSpaceError
+    NonFreeError, KeepOutError, UnknownSpaceError
     ProblemError
         A place outside the part of a large map that is planned on.
     """
@@ -99,10 +110,8 @@ def check_space(space: MapSpace, place: Place, pose: Pose, *, headings: bool = F
     if _fits(space, space.blocked, xy, yaw):
         return
     cell = tuple(np.floor(space.to_cells(xy)[0]).astype(np.int64)[::-1])
-    unknown = space.blocked & ~space.nonfree
-    checks = [(space.nonfree, NonFreeError), (unknown, UnknownSpaceError)]
-    if unknown[cell]:
-        checks.reverse()
+    checks = _causes(space)
+    checks.sort(key=lambda check: not check[0][cell])
     for blocked, error in checks:
         if not _fits(space, blocked, xy, yaw):
             raise error(
@@ -113,6 +122,25 @@ def check_space(space: MapSpace, place: Place, pose: Pose, *, headings: bool = F
                 nearest=nearest_place(space, xy, place=place, yaw=yaw),
                 yaw=yaw,
             )
+
+
+def _causes(space: MapSpace) -> list[Cause]:
+    """Return the kinds of blocked cells, with the errors that name them, by precedence."""
+    nonfree = space.nonfree.copy()
+    checks: list[Cause] = [(nonfree, NonFreeError)]
+    for mask, error in (
+        (space.recent, partial(NonFreeError, recent=True)),
+        (space.kept_out, KeepOutError),
+    ):
+        if mask is not None:
+            only = np.argwhere(mask)
+            confidence, _ = space.evidence_at(only)
+            only = only[confidence < space.problem.epsilon]
+            nonfree[tuple(only.T)] = False
+            checks.append((mask, error))
+    # Of recent cells, those that the map does not call non-free; all of keep-out areas.
+    checks.sort(key=lambda check: check[1] is not KeepOutError)
+    return [*checks, (space.blocked & ~space.nonfree, UnknownSpaceError)]
 
 
 def check_start_is_known(space: MapSpace) -> None:

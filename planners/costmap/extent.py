@@ -40,10 +40,11 @@ def padded_box(problem: PlanningProblem) -> CellBox:
 def padded_bounds(problem: PlanningProblem) -> Floats:
     """Return the box of `padded_box`: lower then upper corner [m, map].
 
-    It holds the observed tiles, the cleared start, and a ring of cells around them. If the tiles
-    span too many cells and unknown cells are not traversable, it holds only the tiles that may be
-    reachable from the start or the goal, so that a distant tile from a single wrong pose does not
-    prevent planning.
+    It holds the observed tiles, the cleared start, and a ring of cells around them; if unknown
+    cells are traversable, also the cells that are not to be entered. If the tiles span too many
+    cells and unknown cells are not traversable, it holds only the tiles that may be reachable from
+    the start or the goal, so that a distant tile from a single wrong pose does not prevent
+    planning.
 
     Raises
     ------
@@ -55,6 +56,8 @@ def padded_bounds(problem: PlanningProblem) -> Floats:
         start = np.array(problem.clear_place)
         lower = np.minimum(lower, start - problem.clear_radius)
         upper = np.maximum(upper, start + problem.clear_radius)
+    if not problem.avoids_unknown:
+        lower, upper = _with_imposed(problem, lower, upper)
     cells, most = _cells(problem, lower, upper), MOST_CELLS[problem.grid.ndim]
     if cells > most:
         raise ProblemError(
@@ -66,6 +69,37 @@ def padded_bounds(problem: PlanningProblem) -> Floats:
     # One and a half cells, so that rounding of the borders can't remove the ring.
     ring = 1.5 * problem.grid.resolution
     return np.concatenate([lower - ring, upper + ring])
+
+
+def _with_imposed(problem: PlanningProblem, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
+    """Return the corners of a box that also holds all cells that are not to be entered.
+
+    Where unknown cells are traversable, a footprint may reach such cells beyond the map.
+
+    Raises
+    ------
+    ProblemError
+        More than `MOST_CELLS` cells.
+    """
+    half = 0.5 * problem.grid.resolution
+    corners = [lower, upper]
+    for cells in (problem.recent_set, problem.keep_out_areas.cells):
+        if len(cells):
+            centres = cells.centres()
+            corners += [centres.min(axis=0) - half, centres.max(axis=0) + half]
+    if problem.keep_out_areas.areas:
+        for corner in np.reshape(problem.keep_out_areas.bounds, (2, 2)):
+            corners.append(np.concatenate([corner, lower[2:]]))
+    box = np.min(corners, axis=0), np.max(corners, axis=0)
+    cells_in_box, most = _cells(problem, *box), MOST_CELLS[problem.grid.ndim]
+    if cells_in_box > most >= _cells(problem, lower, upper):
+        raise ProblemError(
+            "keep_out",
+            f"at most {most} cells in the box around the map and the keep-out areas",
+            f"{cells_in_box:.3g}",
+            hint="Clip the areas to the surroundings of the map.",
+        )
+    return box
 
 
 def _cells(problem: PlanningProblem, lower: Floats, upper: Floats) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 
 from groundmap.arrays import Bools, Bytes, Floats, Ints32
 from groundmap.grid.window import CellState, GridWindow
+from planners.costmap.imposed import imposed_cells
 from planners.costmap.kernels.distance import NOWHERE, squared_distances
 from planners.costmap.moves import squared_need
 from planners.geometry.rounding import slack_at
@@ -49,6 +50,9 @@ def occupancy_of(problem: PlanningProblem, window: GridWindow) -> Occupancy:
         In any dimension.
     """
     states = window.states(epsilon=problem.epsilon)
+    imposed = imposed_cells(problem, window)
+    if imposed is not None:
+        states[imposed] = CellState.NONFREE
     nonfree = states == CellState.NONFREE
     cleared = _near_start(problem, window)
     cleared &= states == CellState.UNKNOWN

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from groundmap.arrays import Bools, Counts, Floats, Floats32, Ints, Ints32
 from groundmap.grid.window import CellFrame
+from planners.costmap.imposed import keep_out_cells, recent_cells
 from planners.costmap.kernels.distance import (
     NOWHERE,
     squared_distances,
@@ -51,8 +52,9 @@ class MapSpace(ABC):
         The observed tiles, surrounded by a ring of unknown cells that also encloses the cleared
         start. The ring stands for all unknown space outside.
     blocked, nonfree, cleared : ndarray of bool, shape (rows, cols) or (layers, rows, cols)
-        Cells that the footprint must not touch; the non-free ones among them; unknown cells that
-        count as free because they are near the start.
+        Cells that the footprint must not touch; the non-free ones among them, with those of
+        keep-out areas and those that the newest views saw as non-free; unknown cells that count as
+        free because they are near the start.
     """
 
     problem: PlanningProblem
@@ -88,6 +90,16 @@ class MapSpace(ABC):
     def slack(self) -> float:
         """Shortfall of the radius that is attributed to rounding between start and goal [m]."""
         return slack_at(self.problem.start_xy, self.problem.goal_xy)
+
+    @cached_property
+    def kept_out(self) -> Bools | None:
+        """Cells that a keep-out area reaches into, shape as `blocked`, or None without any."""
+        return keep_out_cells(self.problem, self.window)
+
+    @cached_property
+    def recent(self) -> Bools | None:
+        """Cells that the newest views saw as non-free, shape as `blocked`, or None without any."""
+        return recent_cells(self.problem, self.window)
 
     @cached_property
     def all_squared(self) -> Ints32:

@@ -8,14 +8,17 @@ from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
+import shapely
 
 from groundmap.arrays import Floats, is_number
+from groundmap.grid.cell_set import CellSet
 from groundmap.grid.grid import ConfidenceGrid
 from groundmap.grid.window import EPSILON
 from planners.error_messages import Point
 from planners.errors import ProblemError
 from planners.problem.costs import CostSettings
 from planners.problem.footprint import LARGEST, Footprint
+from planners.problem.keep_out import KeepOut, as_cell_set
 
 FARTHEST = 1e300  # [m], of start and goal: in cells of any size, still a finite number
 
@@ -27,7 +30,7 @@ Unknown = Literal["avoid", "allow", "penalise"]
 
 @dataclass(frozen=True)
 class PlanningProblem:
-    """Start, goal, footprint and costs on a map.
+    """Start, goal, footprint, costs and keep-out areas on a map.
 
     Parameters
     ----------
@@ -55,6 +58,13 @@ class PlanningProblem:
     cleared_at : sequence of float, optional
         Centre of the cleared cells: x, y (in 3-D: x, y, z) [m, map]. Default: the start. It allows
         several problems on one map to share the cleared cells.
+    recent : CellSet or array_like of int, shape (n, d), optional
+        Cells that the newest views saw as non-free, such as `groundmap.GroundMapper.recent`. They
+        are not to be entered, even if the map, an average of many views, says that they are free.
+        Default: none.
+    keep_out : polygons or cells, optional
+        Areas that no part of the footprint may enter, whatever the map says: polygons of shapely
+        [m, map], one or several, or cells as for `recent`. Default: none.
     epsilon : float, default 0.01
         Cells with a smaller absolute confidence are contested.
 
@@ -86,6 +96,8 @@ got (0, nan).
     clear_start: bool = True
     clear_start_radius: float | None = None
     cleared_at: Sequence[float] | Floats | None = None
+    recent: CellSet | npt.ArrayLike | None = None
+    keep_out: KeepOut | shapely.Geometry | Sequence[shapely.Geometry] | npt.ArrayLike | None = None
     epsilon: float = EPSILON
 
     def __post_init__(self) -> None:
@@ -111,6 +123,8 @@ got (0, nan).
             raise ProblemError("unknown", expected, repr(self.unknown))
         if not isinstance(self.clear_start, bool):
             raise ProblemError("clear_start", "True or False", repr(self.clear_start))
+        object.__setattr__(self, "recent", as_cell_set("recent", self.recent, self.grid))
+        object.__setattr__(self, "keep_out", KeepOut.of(self.keep_out, self.grid))
         if not (is_number(self.epsilon) and 0 < self.epsilon < 1):
             raise ProblemError("epsilon", "a number between 0 and 1", repr(self.epsilon))
 
@@ -124,6 +138,18 @@ got (0, nan).
     def radius(self) -> float:
         """Radius of the disc that contains the footprint at every heading [m]."""
         return self.shape.radius
+
+    @property
+    def recent_set(self) -> CellSet:
+        """The cells that the newest views saw as non-free, as a `CellSet`."""
+        assert isinstance(self.recent, CellSet)
+        return self.recent
+
+    @property
+    def keep_out_areas(self) -> KeepOut:
+        """The keep-out areas as a `KeepOut`."""
+        assert isinstance(self.keep_out, KeepOut)
+        return self.keep_out
 
     @property
     def avoids_unknown(self) -> bool:
@@ -193,9 +219,10 @@ def _pose(name: str, values: Sequence[float] | Floats, ndim: int) -> tuple[float
     places |= isinstance(values, Sequence) and not isinstance(values, str)
     if not places or len(values) not in (ndim, ndim + 1) or not all(map(is_number, values)):
         raise ProblemError(name, expected, repr(values))
-    if max(map(abs, values[:ndim])) > FARTHEST:
+    pose = tuple(map(float, values))
+    if max(map(abs, pose[:ndim])) > FARTHEST:
         raise ProblemError(name, f"a place within {FARTHEST:g} m of the origin", repr(values))
-    return tuple(map(float, values))
+    return pose
 
 
 def _yaw(pose: Sequence[float] | Floats, ndim: int) -> float | None:

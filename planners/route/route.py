@@ -27,6 +27,14 @@ from planners.route.route_files import (
 from planners.search.base import SearchResult
 from planners.search.graph import Graph
 
+CLEARANCES = (  # fields that may be infinite
+    "min_clearance",
+    "known_clearance",
+    "keep_out_clearance",
+    "recent_clearance",
+    "mean_clearance",
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Route:
@@ -52,6 +60,9 @@ class Route:
     known_clearance : float [m]
         As `min_clearance`, but also to the unknown cells near the start that count as free: the
         clearance within known space. It is 0 if the line crosses such a cell.
+    keep_out_clearance, recent_clearance : float [m]
+        As `min_clearance`, but to the cells of keep-out areas alone, and to those that the newest
+        views saw as non-free; infinite without any.
     mean_clearance : float [m]
         Mean along the line of the clearance at the centres of the crossed cells.
     min_confidence, mean_confidence : float
@@ -83,6 +94,8 @@ class Route:
     bound: float | None
     min_clearance: float
     known_clearance: float
+    keep_out_clearance: float
+    recent_clearance: float
     mean_clearance: float
     min_confidence: float
     mean_confidence: float
@@ -122,6 +135,8 @@ class Route:
             bound=result.bound,
             min_clearance=clearance,
             known_clearance=_known_clearance(space, waypoints, clearance),
+            keep_out_clearance=_clearance_to(space, waypoints, space.kept_out),
+            recent_clearance=_clearance_to(space, waypoints, space.recent),
             mean_clearance=_mean(space.clearance_at(line.cells), line.lengths),
             min_confidence=float(sureness.min()) + 0.0,  # + 0.0: an unknown cell's -0.0 is 0.0
             mean_confidence=_mean(sureness, line.lengths) + 0.0,
@@ -140,7 +155,7 @@ class Route:
         values = {name: getattr(self, name) for name in names}
         values["waypoints"] = self.waypoints.tolist()
         values["headings"] = self.headings.tolist()
-        for name in ("min_clearance", "known_clearance", "mean_clearance"):
+        for name in CLEARANCES:
             values[name] = values[name] if math.isfinite(values[name]) else None
         return values
 
@@ -216,6 +231,11 @@ def _mean(values: Floats, weights: Floats) -> float:
     if weights.sum() == 0:
         return float(values[0])
     return float(np.average(values, weights=weights))
+
+
+def _clearance_to(space: MapSpace, waypoints: Floats, cells: Bools | None) -> float:
+    """Return the distance to the cells of a mask; infinite without any."""
+    return math.inf if cells is None else space.clearance_of(waypoints, to=cells)
 
 
 def _known_clearance(space: MapSpace, waypoints: Floats, clearance: float) -> float:

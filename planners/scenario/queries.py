@@ -30,6 +30,7 @@ Expected = Literal[
     "route",
     "OutsideMapError",
     "NonFreeError",
+    "KeepOutError",
     "UnknownSpaceError",
     "EnclosedError",
     "TimeLimitError",
@@ -61,6 +62,9 @@ class QuerySettings(Settings):
     )
     planner: str = Field("astar", description="name of the planner")
     unknown: Unknown = Field("avoid", description="unknown and contested space")
+    recent: bool = Field(
+        False, description="also avoid what the last views saw as non-free, as a live robot does"
+    )
     time_limit: float | None = Field(
         None, ge=0, description="time limit [s]; default: that of the planner"
     )

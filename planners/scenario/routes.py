@@ -26,6 +26,7 @@ IN_TRUTH: dict[str, Any] = {
     "planner": "astar",
     "settings": {},
     "unknown": "avoid",
+    "recent": False,
     "time_limit": None,
 }
 
@@ -58,6 +59,7 @@ def run_query(query: QuerySettings, grid: ConfidenceGrid) -> QueryOutcome:
             goal=query.goal,
             footprint=query.footprint,
             unknown=query.unknown,
+            recent=grid.recent if query.recent else None,
         )
         route = plan(problem, query.planner, **settings)
     except PlanningError as error:

@@ -17,7 +17,7 @@ from planners.scenario.case import Scenario, load_scenario
 from planners.scenario.outcome import Bound, Figure, Outcome
 from planners.scenario.queries import bounds_of
 from planners.scenario.routes import QueryOutcome, compare_with_truth, run_query, true_map
-from planners.scenario.simulated import Simulated, simulate
+from planners.scenario.simulated import Simulated, moving_figures, simulate
 
 DPI = 100  # of the pictures in the report
 MARGIN = 1.5  # [m] around the world, in pictures
@@ -75,6 +75,7 @@ def _run_simulated(scenario: Scenario) -> CaseResult:
     """Map a simulated world; compare map and routes with it."""
     simulated = simulate(scenario)
     figures: dict[str, Figure] = dict(measure(simulated.window, simulated.truth).to_dict())
+    figures |= moving_figures(simulated)
     answers = [run_query(query, simulated.grid) for query in scenario.queries]
     if answers:
         fine = true_map(simulated)

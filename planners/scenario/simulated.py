@@ -8,13 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from groundmap import ConfidenceGrid, GridWindow, GroundMapper, View, fit_ground
+from groundmap import CellState, ConfidenceGrid, GridWindow, GroundMapper, View, fit_ground
+from groundmap.arrays import Bools
 from groundmap.draw import known_bounds
 from groundmap.errors import InputError
 from groundmap.simulate import Drive, World, drive, observe, sample_landmarks
 from groundmap.simulate.known_map import KnownMap
 from groundmap.simulate.scan import scan
-from groundmap.simulate.truth import truth_of
+from groundmap.simulate.truth import touched_cells, truth_of
 from groundmap.simulate.voxel_truth import voxel_truth_of
 from planners.scenario.case import Scenario
 
@@ -30,6 +31,7 @@ class Simulated(NamedTuple):
     grid: ConfidenceGrid
     window: GridWindow  #: cells of the map that the truth covers
     truth: KnownMap
+    moving: Bools  #: cells of the window that moving solids are in at the end
 
 
 def simulate(scenario: Scenario) -> Simulated:
@@ -49,7 +51,36 @@ def simulate(scenario: Scenario) -> Simulated:
     window = _window(world, mapper.grid, scenario.heights)
     make_truth = TRUTHS[mapper.grid.ndim]
     truth = make_truth(world, moves, scenario.sensor, window, scenario.mapper)
-    return Simulated(world, mapper.grid, window, truth)
+    moving = _moving(scenario, world, window, float(moves.times[-1]))
+    return Simulated(world, mapper.grid, window, truth, moving)
+
+
+def moving_figures(simulated: Simulated) -> dict[str, float]:
+    """Return how the last view and the map see the cells that moving solids are in at the end.
+
+    ``moving_nonfree`` is the share that is non-free for planning with `ConfidenceGrid.recent`,
+    ``moving_free_on_map`` the share that the map calls free. Without such solids, no figures.
+    """
+    if not simulated.moving.any():
+        return {}
+    states = simulated.window.states()[simulated.moving]
+    recent = simulated.grid.recent
+    first = np.rint((simulated.window.origin - recent.origin) / recent.resolution)
+    now = recent.mask(first.astype(np.int64)[::-1], simulated.moving.shape)[simulated.moving]
+    return {
+        "moving_nonfree": float((now | (states == CellState.NONFREE)).mean()),
+        "moving_free_on_map": float((states == CellState.FREE).mean()),
+    }
+
+
+def _moving(scenario: Scenario, world: World, window: GridWindow, time: float) -> Bools:
+    """Return the cells that moving solids are in at a time [s]; none on a 3-D map."""
+    if window.count.ndim == 3:
+        return np.zeros(window.count.shape, dtype=np.bool_)
+    solids = tuple(solid for solid in world.solids if solid.velocity != (0.0, 0.0))
+    heights = scenario.mapper.step_height, scenario.mapper.robot_height
+    there = replace(world, solids=solids).at(time).obstacles(*heights)
+    return touched_cells(there, window.origin, window.resolution, window.count.shape)
 
 
 def build_world(scenario: Scenario) -> World:

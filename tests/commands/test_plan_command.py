@@ -14,6 +14,7 @@ from PIL import Image
 
 from command_line import Ran, run
 from groundmap import ConfidenceGrid
+from groundmap.grid.recent_views import RecentView
 from planners import OWN_PLANNERS, max_curvature
 from planners.commands.console import show_waiting
 
@@ -232,3 +233,40 @@ def test_if_all_planners_refuse_the_problem_the_first_reason_is_reported(tmp_pat
     ran = run("plan", tmp_path / "solid.npz", *ends, *options)
     assert ran.code == 2
     assert "costs: expected no costs except length on a 3-D map" in ran.err
+
+
+def test_keep_out_areas_of_a_file_close_the_door(wall: Path, tmp_path: Path) -> None:
+    areas, route, picture = (tmp_path / name for name in ("door.geojson", "r.geojson", "r.png"))
+    ring = [[14.2, 7.9], [14.8, 7.9], [14.8, 10.1], [14.2, 10.1], [14.2, 7.9]]
+    areas.write_text(json.dumps({"type": "Polygon", "coordinates": [ring]}))
+    ran = plan(wall, "--keep-out", areas)
+    assert ran.code == 3
+    assert ran.json["error"] == "EnclosedError"
+    assert "Without the keep-out areas they are connected" in ran.json["reason"]
+    ring[0][0] = ring[3][0] = ring[4][0] = 14.0
+    aside = [[[x, y - 6] for x, y in ring]]
+    areas.write_text(json.dumps({"type": "Polygon", "coordinates": aside}))
+    ran = plan(wall, "--keep-out", areas, "--out", route, "--plot", picture)
+    assert ran.code == 0
+    properties = json.loads(route.read_text())["properties"]
+    assert 0.5 <= properties["keep_out_clearance"] == ran.json["keep_out_clearance"]
+    assert properties["recent_clearance"] is None
+    assert run("plot", wall, "--keep-out", areas, "--recent", "--out", picture).code == 0
+    areas.write_text('{"type": "Point", "coordinates": [1, 2]}')
+    ran = plan(wall, "--keep-out", areas)
+    assert ran.code == 2
+    assert "expected a GeoJSON file with polygons" in ran.err
+
+
+def test_a_saved_map_is_planned_on_with_what_was_there_when_asked(tmp_path: Path) -> None:
+    grid = ConfidenceGrid(resolution=0.2)
+    grid.fuse(np.array([0, 0]), np.full((64, 64), -1.0, dtype=np.float32))
+    wall = np.array([[(6.1, -0.1), (6.1, 12.9)]])
+    none = np.empty((0, 2), dtype=np.int64)
+    grid.recent_views.add(RecentView(wall, np.array([False]), none, np.array([1.0, 6.0])))
+    path = tmp_path / "map.npz"
+    grid.save(path)
+    assert plan(path, start="3,3", goal="12,3").code == 0
+    ran = plan(path, "--recent", start="3,3", goal="12,3")
+    assert ran.code == 3
+    assert "Without what the newest views saw as non-free they are connected" in ran.json["reason"]

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -16,9 +17,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon
 from matplotlib.text import Text
 
-from groundmap import ConfidenceGrid, GroundMapper, StereoRig, View, fit_ground
+from groundmap import CellSet, ConfidenceGrid, GroundMapper, StereoRig, View, fit_ground
 from groundmap.draw import (
+    draw_cells,
     draw_grid,
+    draw_keep_out,
     draw_route,
     draw_routes,
     draw_trajectory,
@@ -225,3 +228,33 @@ def test_outlines_are_drawn_at_the_poses_of_the_robot() -> None:
     assert isinstance(band, Polygon)
     np.testing.assert_allclose(band.get_xy().min(axis=0), (2.5, 2.0))
     np.testing.assert_allclose(band.get_xy().max(axis=0), (3.5, 7.0))
+
+
+def test_cells_and_keep_out_areas_are_drawn_apart_with_a_name_each() -> None:
+    bounds = (0.0, 0.0, 20.0, 20.0)
+    grid = ConfidenceGrid(resolution=1.0)
+    grid.fuse(np.array([0, 0]), np.full((20, 20), -1.0, dtype=np.float32))
+    figure, ax = new_figure(bounds)
+    draw_grid(grid, bounds=bounds, ax=ax)
+    draw_cells(CellSet(np.array([[4, 5], [4, 6]]), 1.0, np.zeros(2)), label="now", ax=ax)
+    holed = shapely.box(8, 8, 16, 16).difference(shapely.box(10, 10, 14, 14))
+    draw_keep_out([holed], ax=ax)
+    assert legend_of(ax)[-2:] == ["now", "keep-out area"]
+    pixels, height = rendered(figure)
+    seen = []
+    for place in ((5.5, 4.5), (6.5, 4.5), (4.5, 4.5), (5.5, 5.5), (12.0, 12.0)):
+        x, y = ax.transData.transform(place)
+        seen.append(pixels[height - int(y), int(x)].tolist())
+    drawn, also, *free = seen
+    assert drawn == also == [232, 84, 47]
+    assert all(each == free[0] != drawn for each in free)
+    x, y = ax.transData.transform([(8.2, 8.2), (9.8, 15.8)]).astype(int).T
+    hatched = pixels[height - y[1] : height - y[0], x[0] : x[1]].reshape(-1, 3)
+    assert 0.02 < (hatched[:, 1] < 120).mean() < 0.5
+
+
+def test_nothing_is_drawn_for_no_cells_and_no_areas() -> None:
+    _, ax = new_figure((0.0, 0.0, 4.0, 4.0))
+    none = CellSet(np.empty((0, 2), dtype=np.int64), 1.0, np.zeros(2))
+    assert draw_cells(none, label="now", ax=ax) == draw_keep_out([], ax=ax) == []
+    assert ax.get_legend() is None

@@ -53,11 +53,14 @@ def drawn(
         ends[None],
         ends[None],
         corners[None],
+        corners[None],
         np.array([caps]),
         np.array([disc]),
         np.array([on_surface]),
         np.array([around]),
         np.array([1.0]),
+        np.zeros(2),
+        np.inf,
     )
     found: Bools = z > 0
     return found
@@ -295,6 +298,7 @@ def test_the_surer_surface_wins_in_any_order(rng: np.random.Generator) -> None:
     ends = rng.uniform((0.0, 0.0), (32.0, 24.0), size=(count, 2, 2))
     outlines = ends[:, [0, 1, 1, 0]] + np.array([(0, 0), (0, 0), (0, 3), (0, 3)])
     on_surface, around = rng.uniform(0.5, 1.0, size=count), rng.uniform(0.1, 0.5, size=count)
+    around[: count // 2] = on_surface[: count // 2]  # as near the camera
     on_surface[1], tops = on_surface[0], rng.uniform(0.2, 2.0, size=count)
     ground_view = np.zeros((count, 2)), np.zeros(count)
 
@@ -303,22 +307,24 @@ def test_the_surer_surface_wins_in_any_order(rng: np.random.Generator) -> None:
         height = np.zeros(SHAPE, dtype=np.float32)
         picked = (
             outlines[order],
+            outlines[order],
             ground_view[0],
             ground_view[1],
             on_surface[order],
             around[order],
             tops[order],
         )
-        draw_surfaces(z, height, ends[order], ends[order], *picked)
+        draw_surfaces(z, height, ends[order], ends[order], *picked, np.zeros(2), np.inf)
         return np.stack([z, height]).astype(np.float64)
 
     forth = drawing(list(range(count)))
     np.testing.assert_array_equal(forth, drawing(list(range(count))[::-1]))
     singly = np.array([drawing([row]) for row in range(count)])
     np.testing.assert_array_equal(forth[0], singly[:, 0].max(axis=0))
-    # The surest surface of a cell gives its top, the highest of equally sure ones.
-    surest = singly[:, 0] == forth[0]
-    np.testing.assert_array_equal(forth[1], np.where(surest, singly[:, 1], -1.0).max(axis=0))
+    # The surest surface of a cell gives its top, the highest known of equally sure ones.
+    known = (singly[:, 0] == forth[0]) & np.isfinite(singly[:, 1])
+    highest = np.where(known, singly[:, 1], -1.0).max(axis=0)
+    np.testing.assert_array_equal(forth[1], np.where(known.any(axis=0), highest, np.inf))
 
 
 @settings(max_examples=100)

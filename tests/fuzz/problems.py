@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import shapely
 
 from fuzz.draw import Draw
 from fuzz.values import array, flag, number, odd, word
@@ -89,9 +90,35 @@ def problem(
         options["epsilon"] = number(draw, 0.001, 0.5, odds)
     if draw.chance(0.3):
         options["costs"] = CostSettings(**settings_of(draw, CostSettings, odds=odds))
+    if draw.chance(0.15):
+        options["recent"] = cells(draw, here, odds=odds)
+    if draw.chance(0.25):
+        drawn = draw.pick((cells, areas))(draw, here, odds=odds)
+        options["keep_out"] = draw.either(odds, lambda: odd(draw), lambda: drawn)
     for name, value in options.items():
         draw.noted(name, value)
     return PlanningProblem(here, **options)
+
+
+def cells(draw: Draw, on: ConfidenceGrid, *, odds: float) -> Any:
+    """Return some cells of a map and around it, or an odd value."""
+    made = draw.numpy.integers(-3, SIDE + 3, (draw.whole(0, 6), on.ndim))
+    return array(draw, made, share=odds)
+
+
+def areas(draw: Draw, on: ConfidenceGrid, *, odds: float) -> Any:
+    """Return triangles and boxes on a map and around it, some of them no polygons."""
+    made: list[Any] = []
+    for _ in range(draw.whole(0, 3)):
+        size = SIDE * on.resolution * draw.pick((0.05, 0.2, 1.0, 0.0))
+        low = on.origin[:2] + draw.numpy.uniform(-0.1, 1.0, 2) * SIDE * on.resolution
+        corners = low + draw.numpy.uniform(0.0, 1.0, (draw.pick((3, 3, 4)), 2)) * size
+        made.append(
+            shapely.Polygon(corners) if draw.chance(0.5) else shapely.box(*low, *low + size)
+        )
+        if draw.chance(odds):
+            made.append(draw.pick((shapely.Point(*low), shapely.Polygon(), odd(draw))))
+    return made[0] if len(made) == 1 else made
 
 
 def settings_of(

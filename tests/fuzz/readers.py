@@ -20,7 +20,7 @@ from groundmap import CellState, ConfidenceGrid, load_map, read_views
 from groundmap.io.alignment import align
 from groundmap.io.movingai_scen import read_movingai_scen
 from groundmap.simulate import drive
-from planners import Roadmap
+from planners import PlanningProblem, Roadmap, plan, read_keep_out
 from planners.commands.settings_file import read_settings
 from planners.scenario.case import load_scenario
 
@@ -216,6 +216,15 @@ POSITIONS: Files = {
 }
 ARCHIVED: Files = {"rig.toml": samples.RIG, "poses.txt": samples.TUM}
 
+
+def _keep_out(folder: Path) -> None:
+    """Plan around the areas of a file."""
+    areas = read_keep_out(folder / "areas.geojson")
+    on = ConfidenceGrid(resolution=0.5)
+    on.fuse(np.array([0, 0]), np.full((24, 24), -1.0, dtype=np.float32))
+    plan(PlanningProblem(on, start=(1, 1), goal=(11, 11), footprint=0.4, keep_out=areas))
+
+
 READERS: tuple[Texts | Archives | RosMap, ...] = (
     Texts("gtsam", samples.GTSAM, _views, weight=2),
     Texts("folder", FOLDER, _views, weight=2),
@@ -244,5 +253,6 @@ READERS: tuple[Texts | Archives | RosMap, ...] = (
           weight=0.5),
     Texts("scenario", {"scenario.toml": samples.SCENARIO}, _scenario, weight=2),
     Texts("settings", {"s.toml": samples.SETTINGS}, lambda f: read_settings(f / "s.toml")),
+    Texts("keep-out", {"areas.geojson": samples.KEEP_OUT}, _keep_out),
     Archives("roadmap", "roadmap.npz", samples.roadmap, _roadmap),
 )  # fmt: skip

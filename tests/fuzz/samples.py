@@ -86,6 +86,14 @@ MOVINGAI = b"type octile\nheight 5\nwidth 6\nmap\n@@@@@@\n@....@\n@.TG.@\n@.SW.@
 VOXELS = b"voxel 6 5 4\n0 0 0\n5 4 3\n2 2 1\n3 2 1\n"
 SCEN = b"version 1\n0 maps/arena.map 6 5 1 1 4 3 4.41421356\n1\tmy maps/x.map\t6 5 1 1 1 1 0\n"
 SCEN_3D = b"version 1\narena.3dmap\n1 1 1 4 3 2 4.2 1.1\n0 0 0 0 0 0 0 1.0\n"
+KEEP_OUT = b"""\
+{"type": "FeatureCollection", "features": [
+  {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon",
+    "coordinates": [[[4, 3], [6, 3], [6, 5], [4, 5], [4, 3]]]}},
+  {"type": "Feature", "properties": null, "geometry": {"type": "MultiPolygon",
+    "coordinates": [[[[8, 8], [9, 8], [9, 9.5], [8, 8]]], [[[0, 9], [1, 9], [1, 10], [0, 9]]]]}}
+]}
+"""
 SETTINGS = b"""\
 [mapper]
 resolution = 0.2

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from groundmap.arrays import Floats
+from groundmap.arrays import Floats, Ints
 from groundmap.evidence.ground_plane.height_classes import GroundView
-from groundmap.evidence.ground_plane.kernels.lines import gap_chords
+from groundmap.evidence.ground_plane.kernels.lines import SAME_BEARING, gap_chords
 from groundmap.evidence.uncertainty import MODELS
 from groundmap.settings import MapperSettings
 
@@ -83,12 +83,28 @@ def _gaps(ground_view: GroundView, settings: MapperSettings) -> tuple[Floats, Fl
     )
     share = ranges / np.where(full > 0, full, 1.0)
     heights = ground_view.camera_height + (heights - ground_view.camera_height) * share
-    bearings = np.arctan2(points[:, 1], points[:, 0])
-    order = np.argsort(bearings, kind="stable")
-    order = order[ranges[order] > settings.min_range]
-    lines = (bearings[order], ranges[order], heights[order], ground_view.camera_height)
+    order, bearings = _by_bearing(np.arctan2(points[:, 1], points[:, 0]), ranges)
+    kept = ranges[order] > settings.min_range
+    order, bearings = order[kept], bearings[kept]
+    lines = (bearings, ranges[order], heights[order], ground_view.camera_height)
     chords, _ = gap_chords(*lines, np.inf)
     return gap_chords(*lines, widest_gap(chords, settings))
+
+
+def _by_bearing(bearings: Floats, ranges: Floats) -> tuple[Ints, Floats]:
+    """Return the order of lines by bearing, those of one bearing by range, and their bearings.
+
+    Bearings that differ by rounding are one: the order of such lines must not depend on it.
+
+    Parameters
+    ----------
+    bearings, ranges : ndarray, shape (n,)
+    """
+    order = np.argsort(bearings, kind="stable")
+    turned = bearings[order]
+    group = np.concatenate([[0], np.cumsum(np.diff(turned) > SAME_BEARING)])[: len(order)]
+    first = np.searchsorted(group, group)
+    return order[np.lexsort([ranges[order], group])], turned[first]
 
 
 def widest_gap(chords: Floats, settings: MapperSettings) -> float:
@@ -104,6 +120,6 @@ def widest_gap(chords: Floats, settings: MapperSettings) -> float:
     """
     if len(chords) == 0:
         return settings.sight_gap
-    width = np.hypot(*(chords[:, 1] - chords[:, 0]).T)
-    usual = float(np.quantile(width, USUAL_GAPS))
+    width = np.sort(np.hypot(*(chords[:, 1] - chords[:, 0]).T))
+    usual = float(np.interp(USUAL_GAPS * (len(width) - 1), np.arange(len(width)), width))
     return min(max(UNUSUAL * usual, settings.support_width), settings.sight_gap)

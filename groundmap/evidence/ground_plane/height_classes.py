@@ -20,6 +20,7 @@ from groundmap.view.camera_check import check_camera, check_plane
 from groundmap.view.ground_plane import GroundPlane
 from groundmap.view.view import Features, View, sigma_along
 
+UNSURE = 2.0  # standard deviations that must not reach from a feature to the camera
 HOLLOW = 0.02  # [m per m of range], added to the depth that is traversable
 
 
@@ -44,6 +45,13 @@ class GroundView(NamedTuple):
     drop_off_sureness: Floats  #: shape (b,), confidence from 0 to 1, increasing with depth
     used: int  #: number of features in any of the above
     dropped: Counter[str]  #: number of other features, by reason
+
+    def to_map(self, xy: Floats) -> Floats:
+        """Return places, shape (..., 2) [m, view], in the map [m, map]."""
+        x, y = xy[..., 0], xy[..., 1]
+        cos, sin = self.forward
+        turned: Floats = np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
+        return self.viewpoint + turned
 
 
 class _Heights(NamedTuple):
@@ -82,8 +90,8 @@ def flatten(view: View, settings: MapperSettings, *, number: int | None = None) 
 
     Ground features lie within max(step_height, 2 sigma_h + r sigma_tilt) of the plane. Obstacle
     features lie above, up to the height of the robot. Higher features are overhead, lower ones
-    below ground. Segments are clipped to the obstacle band. Features with a standard deviation
-    above `max_range` are dropped.
+    below ground. Segments are clipped to the obstacle band. Features of unknown
+    depth are dropped: those within two standard deviations of the camera.
 
     Parameters
     ----------
@@ -106,17 +114,16 @@ def flatten(view: View, settings: MapperSettings, *, number: int | None = None) 
     forward = T_map_camera[:2, 2] / np.hypot(T_map_camera[0, 2], T_map_camera[1, 2])
     dropped = Counter(view.dropped)
     points = _measure(view.points, view, plane, forward, settings)
-    lasting = (view.segments.xyz[:, 0] != view.segments.xyz[:, 1]).any(axis=1)
-    dropped["zero_length"] += int((~lasting).sum())
-    segments = _measure(view.segments.select(lasting), view, plane, forward, settings)
-    segments.feature[...] += len(view.points)
-    parts = [
-        _point_classes(points, settings, dropped),
-        _segment_classes(segments, settings, dropped),
-    ]
+    parts = [_point_classes(points, settings, dropped)]
+    if len(view.segments):  # most logs have none
+        lasting = (view.segments.xyz[:, 0] != view.segments.xyz[:, 1]).any(axis=1)
+        dropped["zero_length"] += int((~lasting).sum())
+        segments = _measure(view.segments.select(lasting), view, plane, forward, settings)
+        segments.feature[...] += len(view.points)
+        parts.append(_segment_classes(segments, settings, dropped))
     obstacles, grounds = [part.obstacles for part in parts], [part.ground for part in parts]
     n_points = len(obstacles[0].xy)
-    ends = np.arange(n_points, n_points + len(obstacles[1].xy), dtype=np.int64)
+    ends = np.arange(n_points, sum(len(part.xy) for part in obstacles), dtype=np.int64)
     used = sum(part.used for part in parts)
     return GroundView(
         viewpoint=T_map_camera[:2, 3],
@@ -193,7 +200,7 @@ class _Classes(NamedTuple):
 def _point_classes(points: _Heights, settings: MapperSettings, dropped: Counter[str]) -> _Classes:
     near = points.radius < settings.min_range
     far = points.radius > settings.max_range
-    unsure = ~near & ~far & (points.sigma > settings.max_range)
+    unsure = ~near & ~far & _is_unsure(points)
     inside = ~near & ~far & ~unsure
     overhead = inside & (points.height > settings.robot_height)
     below = inside & (points.height < -points.tolerance)
@@ -214,11 +221,17 @@ def _point_classes(points: _Heights, settings: MapperSettings, dropped: Counter[
     )
 
 
+def _is_unsure(features: _Heights) -> Bools:
+    """Return which features may as well be at the camera: nothing is known of their depth."""
+    unsure: Bools = UNSURE * features.sigma > features.radius
+    return unsure
+
+
 def _segment_classes(
     segments: _Heights, settings: MapperSettings, dropped: Counter[str]
 ) -> _Classes:
     """Split segments into an obstacle piece and a ground piece, each of which may be empty."""
-    unsure: Bools = np.logical_or.reduce(segments.sigma > settings.max_range, axis=1)
+    unsure: Bools = np.logical_or.reduce(_is_unsure(segments), axis=1)
     dropped["too_uncertain"] += int(unsure.sum())
     segments = _pick(segments, ~unsure)
     reached = inside_circle(segments.xy[:, 0], segments.xy[:, 1], settings.max_range)

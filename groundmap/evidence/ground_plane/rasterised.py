@@ -9,6 +9,7 @@ from groundmap.errors import InputError
 from groundmap.evidence.evidence import Evidence
 from groundmap.evidence.ground_plane.height_classes import GroundView
 from groundmap.evidence.ground_plane.kernels.raster import (
+    EDGE,
     draw_surfaces,
     fill_star,
     lowest_sight,
@@ -40,8 +41,8 @@ def evidence_of(
 
     Cells in the fan are free: -1 where a line of sight reaches the ground, closer to 0 the higher
     the lowest line of sight passes. Cells below the base are free within the narrowest footprint.
-    Surfaces are above 0, spread by the uncertainty model, and override free cells. Cells with
-    missing ground are non-free, too.
+    Surfaces are above 0, spread by the uncertainty model up to `max_range`, and override free
+    cells. Cells with missing ground are non-free, too.
 
     Parameters
     ----------
@@ -60,10 +61,15 @@ def evidence_of(
     model = MODELS[settings.uncertainty]
     to_cells = _CellsOf(ground_view, grid)
     origin = to_cells(np.zeros((1, 2)))[0]
-    free, ends, cores = map(to_cells, (fan.free, surfaces.ends, surfaces.cores))
-    outlines = to_cells(model.outline(surfaces.cores, surfaces.reach))
-    caps = model.caps(surfaces.reach) / grid.resolution
-    discs = surfaces.discs / grid.resolution
+    firm = np.flatnonzero(surfaces.kind != SurfaceKind.DOUBTFUL)
+    cores, reach = surfaces.cores[firm], surfaces.reach[firm]
+    spread = model.outline(cores, reach)
+    sides = _within(spread, settings.max_range)
+    free, ends, cores, outlines, sides = map(
+        to_cells, (fan.free, surfaces.ends[firm], cores, spread, sides)
+    )
+    caps = model.caps(reach) / grid.resolution
+    discs = surfaces.discs[firm] / grid.resolution
     wheels, half_width = (
         to_cells(ground_view.base),
         0.5 * settings.narrowest_footprint / grid.resolution,
@@ -76,7 +82,9 @@ def evidence_of(
         *_around(cores, caps),
         *_around(ends, discs[:, None]),
     ]
+    farthest = settings.max_range / grid.resolution
     drawn = np.concatenate([origin[None], *(array.reshape(-1, 2) for array in corners)])
+    drawn = np.clip(drawn, origin - farthest - MARGIN, origin + farthest + MARGIN)
     if not (np.abs(drawn) < FARTHEST_CELL).all():
         raise InputError(
             "view",
@@ -95,9 +103,8 @@ def evidence_of(
         )
     z = np.zeros(shape[::-1], dtype=np.float32)
     height = np.full(z.shape, ground_view.camera_height, dtype=np.float32)
-    on_surface, around = model.evidence(surfaces.reach, grid.resolution)
-    belief = fan.contradictions.belief
-    drawn = surfaces.kind != SurfaceKind.DOUBTFUL
+    on_surface, around = model.evidence(reach, grid.resolution)
+    belief = fan.contradictions.belief[firm]
     if len(free):
         odd = np.zeros(z.shape, dtype=np.uint8)
         free = free - lower
@@ -110,17 +117,27 @@ def evidence_of(
     draw_surfaces(
         z,
         height,
-        ends[drawn] - lower,
-        cores[drawn] - lower,
-        outlines[drawn] - lower,
-        caps[drawn],
-        discs[drawn],
-        (on_surface * belief)[drawn],
-        (around * belief)[drawn],
-        surfaces.tops.max(axis=1)[drawn],
+        ends - lower,
+        cores - lower,
+        outlines - lower,
+        sides - lower,
+        caps,
+        discs,
+        on_surface * belief,
+        around * belief,
+        surfaces.tops[firm].max(axis=1),
+        origin - lower,
+        farthest,
     )
     evidence = Evidence(lower[::-1].astype(np.int64), z, height)
     return with_drop_offs(evidence, ground_view, grid)
+
+
+def _within(places: Floats, farthest: float) -> Floats:
+    """Return places, shape (..., 2) [m, view], pulled along their rays to within a distance."""
+    ranges = np.hypot(places[..., 0], places[..., 1])
+    within: Floats = places * np.minimum(farthest / np.maximum(ranges, farthest), 1.0)[..., None]
+    return within
 
 
 def _draw_sight(
@@ -161,7 +178,7 @@ def with_drop_offs(evidence: Evidence, ground_view: GroundView, grid: Confidence
     passed, line = missing_ground(ground_view, 0.5 * grid.resolution)
     number = np.concatenate([np.arange(len(ground_view.drop_offs)), line])
     places = np.concatenate([ground_view.drop_offs, passed])
-    cells = np.floor(_CellsOf(ground_view, grid)(places)).astype(np.int64)[:, ::-1]
+    cells = np.floor(_CellsOf(ground_view, grid)(places) + EDGE).astype(np.int64)[:, ::-1]
     lower, z, height = _extend(evidence, cells.min(axis=0), cells.max(axis=0) + 1)
     # In ascending confidence; at equal confidence the least deep comes last.
     order = np.lexsort(
@@ -203,12 +220,7 @@ class _CellsOf:
         self.ground_view, self.grid = ground_view, grid
 
     def __call__(self, xy: Floats) -> Floats:
-        x, y = xy[..., 0], xy[..., 1]
-        cos, sin = self.ground_view.forward
-        turned = np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
-        cells: Floats = (
-            self.ground_view.viewpoint + turned - self.grid.origin
-        ) / self.grid.resolution
+        cells: Floats = (self.ground_view.to_map(xy) - self.grid.origin) / self.grid.resolution
         return cells
 
 

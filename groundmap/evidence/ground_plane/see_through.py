@@ -54,8 +54,7 @@ def contradictions(ground_view: GroundView, surfaces: Surfaces) -> Contradiction
     bearings = np.arctan2(points[:, 1], points[:, 0])
     order = np.argsort(bearings, kind="stable")
     feature = ground_view.feature[order]
-    _, number, rows = np.unique(feature, return_inverse=True, return_counts=True)
-    shares = 1.0 / rows[number]  # the ends of a segment are one feature
+    shares = 1.0 / np.bincount(feature)[feature]  # the ends of a segment are one feature
     bearings, points, heights = bearings[order], points[order], heights[order]
     ends = _solid_ends(surfaces)
 
@@ -83,7 +82,7 @@ def contradictions(ground_view: GroundView, surfaces: Surfaces) -> Contradiction
     against[~firm], _ = count(~firm, 0.0)
     made_of = np.array([MADE_OF[kind] for kind in SurfaceKind])[surfaces.kind]
     belief = np.where(against > made_of, made_of / (made_of + against), 1.0)
-    return Contradictions(against, belief, len(np.unique(feature[passes])))
+    return Contradictions(against, belief, int(np.count_nonzero(np.bincount(feature[passes]))))
 
 
 def _solid_ends(surfaces: Surfaces) -> Floats:

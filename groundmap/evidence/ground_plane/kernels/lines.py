@@ -11,6 +11,8 @@ from numba import njit
 from groundmap.arrays import Bools, Floats
 
 WIDEST_GAP = 1.5  # [rad], between two lines: a chord must not pass the viewpoint
+SAME_BEARING = 1e-9  # [rad]: what differs by less is rounding
+SAME_RANGE = 1e-9  # [m]
 NARROWEST_GAP = 1e-9  # [rad], between two lines; least angle of a surface
 
 
@@ -55,8 +57,9 @@ def count_contradicting(
         if last - first < NARROWEST_GAP:  # seen end-on, or across the seam, behind the camera
             continue
         square = ex * ex + ey * ey
-        row = np.searchsorted(bearings, first)
-        while row < len(bearings) and bearings[row] <= last:
+        # A feature at the bearing of an end is seen through the surface, up to rounding.
+        row = np.searchsorted(bearings, first - SAME_BEARING)
+        while row < len(bearings) and bearings[row] <= last + SAME_BEARING:
             x, y = points[row, 0], points[row, 1]
             row += 1
             facing = x * ey - y * ex
@@ -144,7 +147,7 @@ def gap_chords(
                     chords[size, side, 1] = radius * np.sin(bearings[line])
                     ends[size, side] = eye + (heights[line] - eye) * (radius / ranges[line])
                 size += 1
-            if ranges[i] > ranges[j]:
+            if ranges[i] > ranges[j] + SAME_RANGE:
                 break
             top -= 1
         stack[top] = j

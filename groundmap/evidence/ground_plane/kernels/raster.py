@@ -2,6 +2,8 @@
 
 A cell is inside a polygon if its centre is. Borders are half-open: of two polygons that share a
 border, exactly one contains a cell on it. A line covers every cell that it passes through.
+Features in whole pixels, and viewpoints on corners of cells, put borders exactly on centres: what
+lies on a border up to rounding counts by one rule.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ from groundmap.arrays import Bools, Bytes, Floats, Floats32
 
 FREE = np.float32(-1.0)
 NO_TOP = np.float32(np.inf)  # in the spread around a surface
-EDGE = 1e-9  # [cells], tolerance of centres inside triangles
+EDGE = 1e-9  # [cells]: places this near to a border or a centre are on it, whatever the rounding
 STEPS = np.float32(64.0)  # [1/m], heights are rounded up to 1/64 m to hide rounding errors
 
 
@@ -72,8 +74,8 @@ def _flip_right_of(odd: Bytes, p: Floats, q: Floats) -> None:
 
 @njit(cache=True, nogil=True)
 def _first_centre(coordinate: float) -> int:
-    """Return the first cell whose centre is at or after a coordinate."""
-    return int(np.ceil(coordinate - 0.5))
+    """Return the first cell whose centre is at or after a coordinate, up to rounding."""
+    return int(np.ceil(coordinate - 0.5 - EDGE))
 
 
 @njit(cache=True, nogil=True)
@@ -83,16 +85,20 @@ def draw_surfaces(
     ends: Floats,
     cores: Floats,
     outlines: Floats,
+    sides: Floats,
     caps: Floats,
     discs: Floats,
     on_surface: Floats,
     around: Floats,
     tops: Floats,
+    origin: Floats,
+    farthest: float,
 ) -> None:
     """Raise z to the evidence of surfaces and of the spread around them.
 
     A cell gets the maximum z of all surfaces, and the height of this surface's top; of several
-    surfaces with this z, the highest top.
+    surfaces with this z, the highest top that is known (near the camera, the spread around a
+    surface has the z of the surface). Nothing spreads beyond `farthest` from `origin`.
 
     Parameters
     ----------
@@ -102,6 +108,8 @@ def draw_surfaces(
         Ends of the surfaces, and centres of the caps.
     outlines : ndarray, shape (s, 4, 2) [cells]
         Quadrangles of the spread.
+    sides : ndarray, shape (s, 4, 2) [cells]
+        The same corners, pulled to within `farthest`.
     caps : ndarray, shape (s, 2) [cells]
         Radii of the caps of the spread; 0 for none.
     discs : ndarray, shape (s,) [cells]
@@ -109,19 +117,22 @@ def draw_surfaces(
     on_surface, around : ndarray, shape (s,)
         Values of z on the surface and in its spread.
     tops : ndarray, shape (s,) [m]
+    origin : ndarray, shape (2,) [cells]
+    farthest : float [cells]
     """
     for i in range(len(ends)):
         spread, top = np.float32(around[i]), np.float32(tops[i])
-        _fill_quadrangle(z, height, outlines[i], spread, NO_TOP)
-        _draw_line(z, height, outlines[i, 0], outlines[i, 3], spread, NO_TOP)
-        _draw_line(z, height, outlines[i, 1], outlines[i, 2], spread, NO_TOP)
+        _fill_quadrangle(z, height, outlines[i], spread, NO_TOP, origin, farthest)
+        _draw_line(z, height, sides[i, 0], sides[i, 3], spread, NO_TOP)
+        _draw_line(z, height, sides[i, 1], sides[i, 2], spread, NO_TOP)
         for side in range(2):
             if caps[i, side] > 0.0:
-                _fill_disc(z, height, cores[i, side], caps[i, side], spread, NO_TOP)
+                cap, radius = cores[i, side], caps[i, side]
+                _fill_disc(z, height, cap, radius, spread, NO_TOP, origin, farthest)
         surface = np.float32(on_surface[i])
         if discs[i] > 0.0:
             middle = 0.5 * (ends[i, 0] + ends[i, 1])
-            _fill_disc(z, height, middle, discs[i], surface, top)
+            _fill_disc(z, height, middle, discs[i], surface, top, origin, np.inf)
             _draw_line(z, height, middle, middle, surface, top)
         else:
             _draw_line(z, height, ends[i, 0], ends[i, 1], surface, top)
@@ -129,11 +140,21 @@ def draw_surfaces(
 
 @njit(cache=True, nogil=True)
 def _fill_quadrangle(
-    z: Floats32, height: Floats32, corners: Floats, value: np.float32, top: np.float32
+    z: Floats32,
+    height: Floats32,
+    corners: Floats,
+    value: np.float32,
+    top: np.float32,
+    origin: Floats,
+    farthest: float,
 ) -> None:
     lowest, highest = corners[:, 1].min(), corners[:, 1].max()
     crossings = np.empty(4)
     for row in range(max(_first_centre(lowest), 0), min(_first_centre(highest), z.shape[0])):
+        half = farthest**2 - (row + 0.5 - origin[1]) ** 2
+        if half < 0.0:
+            continue
+        half = np.sqrt(half)
         count = 0
         for i in range(4):
             p, q = corners[i], corners[(i + 1) % 4]
@@ -145,15 +166,22 @@ def _fill_quadrangle(
                 count += 1
         crossings[:count].sort()
         for pair in range(0, count - 1, 2):
-            left = max(_first_centre(crossings[pair]), 0)
-            right = min(_first_centre(crossings[pair + 1]), z.shape[1])
+            left = max(_first_centre(max(crossings[pair], origin[0] - half)), 0)
+            right = min(_first_centre(min(crossings[pair + 1], origin[0] + half)), z.shape[1])
             for col in range(left, right):
                 _raise(z, height, row, col, value, top)
 
 
 @njit(cache=True, nogil=True)
 def _fill_disc(
-    z: Floats32, height: Floats32, centre: Floats, radius: float, value: np.float32, top: np.float32
+    z: Floats32,
+    height: Floats32,
+    centre: Floats,
+    radius: float,
+    value: np.float32,
+    top: np.float32,
+    origin: Floats,
+    farthest: float,
 ) -> None:
     for row in range(
         max(_first_centre(centre[1] - radius), 0),
@@ -165,7 +193,9 @@ def _fill_disc(
             min(_first_centre(centre[0] + radius) + 1, z.shape[1]),
         ):
             dx = col + 0.5 - centre[0]
-            if dx * dx + dy * dy <= radius * radius:
+            away = (col + 0.5 - origin[0]) ** 2 + (row + 0.5 - origin[1]) ** 2
+            near = dx * dx + dy * dy <= radius * radius + EDGE
+            if near and away <= farthest * farthest + EDGE:
                 _raise(z, height, row, col, value, top)
 
 
@@ -174,8 +204,8 @@ def _draw_line(
     z: Floats32, height: Floats32, p: Floats, q: Floats, value: np.float32, top: np.float32
 ) -> None:
     """Visit the cells from p to q in order (Amanatides and Woo 1987)."""
-    col, row = int(np.floor(p[0])), int(np.floor(p[1]))
-    last_col, last_row = int(np.floor(q[0])), int(np.floor(q[1]))
+    col, row = int(np.floor(p[0] + EDGE)), int(np.floor(p[1] + EDGE))
+    last_col, last_row = int(np.floor(q[0] + EDGE)), int(np.floor(q[1] + EDGE))
     dx, dy = q[0] - p[0], q[1] - p[1]
     step_x, step_y = (1 if dx > 0 else -1), (1 if dy > 0 else -1)
     # Share of the line at the next border in x and y, and from one border to the next.
@@ -187,7 +217,7 @@ def _draw_line(
     for _ in range(abs(last_col - col) + abs(last_row - row) + 1):
         if 0 <= row < z.shape[0] and 0 <= col < z.shape[1]:
             _raise(z, height, row, col, value, top)
-        if col != last_col and (next_x < next_y or row == last_row):
+        if col != last_col and (next_x + EDGE < next_y or row == last_row):
             col += step_x
             next_x += each_x
         else:
@@ -199,11 +229,12 @@ def _draw_line(
 def _raise(
     z: Floats32, height: Floats32, row: int, col: int, value: np.float32, top: np.float32
 ) -> None:
-    """Raise a cell to a higher value with its top, or at an equal value to the higher top."""
+    """Raise a cell to a higher value with its top, or at an equal value to the higher known top."""
     if value > z[row, col]:
         z[row, col], height[row, col] = value, top
     elif value == z[row, col]:
-        height[row, col] = max(height[row, col], top)
+        known = height[row, col]
+        height[row, col] = min(known, top) if max(known, top) == NO_TOP else max(known, top)
 
 
 @njit(cache=True, nogil=True)
@@ -236,13 +267,13 @@ def lowest_sight(
         # under quarter turns of the map.
         slope_x = (by * fall_a - ay * fall_b) / area
         slope_y = (ax * fall_b - bx * fall_a) / area
-        first = max(_first_centre(origin[1] + min(0.0, ay, by) - EDGE), 0)
-        last = min(_first_centre(origin[1] + max(0.0, ay, by) + EDGE), height.shape[0])
+        first = max(_first_centre(origin[1] + min(0.0, ay, by)), 0)
+        last = min(_first_centre(origin[1] + max(0.0, ay, by) + 2.0 * EDGE), height.shape[0])
         for row in range(first, last):
             y = row + 0.5 - origin[1]
             left, right = _span(y, ax, ay, bx, by)
-            begin = max(_first_centre(origin[0] + left - EDGE), 0)
-            end = min(_first_centre(origin[0] + right + EDGE), height.shape[1])
+            begin = max(_first_centre(origin[0] + left), 0)
+            end = min(_first_centre(origin[0] + right + 2.0 * EDGE), height.shape[1])
             for col in range(begin, end):
                 x = col + 0.5 - origin[0]
                 low = np.float32(eye + (slope_x * x + slope_y * y))
@@ -273,7 +304,7 @@ def roll_over(z: Floats32, height: Floats32, centre: Floats, radius: float) -> N
             min(_first_centre(centre[0] + radius) + 1, z.shape[1]),
         ):
             dx, dy = col + 0.5 - centre[0], row + 0.5 - centre[1]
-            if dx * dx + dy * dy <= radius * radius:
+            if dx * dx + dy * dy <= radius * radius + EDGE:
                 z[row, col], height[row, col] = FREE, 0.0
 
 

@@ -10,6 +10,7 @@ from groundmap.arrays import Floats
 WIDEST = 0.2  # [rad], largest half-width of a neighbourhood
 MOST = 2048  # neighbours to either side, which bounds the time in dense views
 FEWEST = 3  # features to average, including itself; a slope takes one more
+SAME_BEARING = 1e-9  # [rad]: neighbours whose bearings spread less are at one bearing
 STIFFEST = 1e-3  # least relative determinant of a fit; below it, all neighbours have one bearing
 
 
@@ -60,7 +61,7 @@ def smooth_along_rays(
         determinant = s0 * s2 - s1 * s1
         if neighbours < FEWEST:
             smoothed[i], deviation[i] = inverse[i], sigma[i]
-        elif neighbours > FEWEST and determinant > STIFFEST * s0 * s2:
+        elif neighbours > FEWEST and determinant > max(STIFFEST * s2, SAME_BEARING**2 * s0) * s0:
             smoothed[i] = (s2 * t0 - s1 * t1) / determinant
             deviation[i] = np.sqrt(s2 / determinant)
         else:
