@@ -26,13 +26,19 @@ class Ellipsoid:
 
         Parameters
         ----------
-        xy : ndarray, shape (n, 2) [m, view]
-        covariance : ndarray, shape (n, 2, 2) [m², view]
+        xy : ndarray, shape (n, d) [m]
+            From the viewpoint.
+        covariance : ndarray, shape (n, d, d) [m²]
         """
         ray = _unit(xy)
         variance = np.einsum("ni,nij,nj->n", ray, covariance, ray)
         sigma: Floats = np.sqrt(np.maximum(variance, 0.0))  # rounding may give values below 0
         return sigma
+
+    @property
+    def falloff(self) -> Floats:
+        """z in equal shells of the spread, from the surface outwards, as a share of `evidence`."""
+        return np.ones(1)
 
     def core_radius(self, resolution: float) -> float:
         """Return the half-width of the core of a lone point, half a cell [m]."""
@@ -147,6 +153,6 @@ def _quadrangle(near: Floats, far: Floats) -> Floats:
 
 
 def _unit(vectors: Floats) -> Floats:
-    length = np.hypot(vectors[..., 0], vectors[..., 1])[..., None]
+    length = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None]
     unit: Floats = vectors / np.where(length > 0, length, 1.0)
     return unit
