@@ -18,7 +18,7 @@ class Evidence(NamedTuple):
     """
 
     lower: (
-        Ints  #: shape (d,), cell ``[row, col]``, in 3-D ``[layer, row, col]``, of the first entry
+        Ints  #: shape (d,), cell of the first entry: ``[row, col]``, in 3-D ``[layer, row, col]``
     )
     z: Floats32  #: shape (rows, cols), in 3-D (layers, rows, cols), in [-1, 1]; 0 for no evidence
     #: shape of `z` [m], see `groundmap.ConfidenceGrid.fuse`; None without heights

@@ -51,9 +51,12 @@ def as_band(low: object, high: object, free_below: object, doubtful: object) -> 
     InputError
         Not ``low < free_below <= high``, or `doubtful` is below 0.
     """
-    heights = (as_number("band", each, "numbers [m]") for each in (low, high, free_below))
-    sum_of_evidence = as_number("doubtful", doubtful, "a number of 0 or more", least=0.0)
-    band = Band(*heights, doubtful=sum_of_evidence)
+    band = Band(
+        low=as_number("band", low, "numbers [m]"),
+        high=as_number("band", high, "numbers [m]"),
+        free_below=as_number("band", free_below, "numbers [m]"),
+        doubtful=as_number("doubtful", doubtful, "a number of 0 or more", least=0.0),
+    )
     if not band.low < band.free_below <= band.high:
         expected = "low < free_below <= high [m]"
         raise InputError("band", expected, f"{band.low:g}, {band.free_below:g}, {band.high:g}")
