@@ -117,10 +117,11 @@ class MapperSettings(Settings):
     cap: int = Field(
         50, ge=1, le=2**32 - 1, description="update count from which 'capped' forgets old views"
     )
-    uncertainty: Literal["ellipsoid", "radius", "none"] = Field(
+    uncertainty: Literal["ellipsoid", "gaussian", "radius", "none"] = Field(
         "ellipsoid",
-        description="spread of surfaces over cells: by their covariance ('ellipsoid'), equal in "
-        "all directions ('radius'), or 'none'",
+        description="spread of surfaces over cells: by their covariance ('ellipsoid'), the same "
+        "with most of it near the surface ('gaussian'), equal in all directions ('radius'), or "
+        "'none'",
     )
     spread_sigmas: float = Field(
         2.0, ge=0, le=LARGEST, description="extent of this spread [standard deviations]"

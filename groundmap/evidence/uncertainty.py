@@ -9,6 +9,8 @@ import numpy as np
 from groundmap.arrays import Floats
 
 PEAK = 4.0  # ratio of z on a surface to z around it
+SHELLS = 4  # steps in which a Gaussian decreases
+SPREAD = 2.0  # standard deviations of a Gaussian to its end
 
 
 class Ellipsoid:
@@ -139,7 +141,37 @@ class Exact(Ellipsoid):
         return np.zeros(len(xy))
 
 
-MODELS: dict[str, Ellipsoid] = {model.name: model for model in (Ellipsoid(), Radius(), Exact())}
+class Gaussian(Ellipsoid):
+    """A Gaussian along the line of sight, which is truncated where the ellipsoid ends.
+
+    Around the surface, z decreases from it in steps; along a ray it sums to one cell of surface.
+    """
+
+    name: ClassVar[str] = "gaussian"
+
+    @property
+    def falloff(self) -> Floats:
+        """z in equal shells of the spread, from the surface outwards, as a share of `evidence`."""
+        middles = (np.arange(SHELLS) + 0.5) * (SPREAD / SHELLS)
+        heights = np.exp(-0.5 * middles**2)
+        falloff: Floats = heights / heights[0]
+        return falloff
+
+    def evidence(self, reach: Floats, resolution: float) -> tuple[Floats, Floats]:
+        """Return z on the surface and in the innermost shell around it, shape (s,) each.
+
+        Parameters
+        ----------
+        reach : ndarray, shape (s, k) [m]
+        resolution : float [m]
+        """
+        density = _constant_density(reach, resolution)
+        return np.minimum(PEAK * density, 1.0), np.minimum(density / self.falloff.mean(), 1.0)
+
+
+MODELS: dict[str, Ellipsoid] = {
+    model.name: model for model in (Ellipsoid(), Radius(), Exact(), Gaussian())
+}
 
 
 def _constant_density(reach: Floats, resolution: float) -> Floats:

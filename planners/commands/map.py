@@ -60,7 +60,7 @@ def map_command(
     uncertainty: Annotated[
         str | None,
         typer.Option(
-            help="Uncertainty of surfaces: ellipsoid, radius or none; default: ellipsoid."
+            help="Uncertainty of surfaces: ellipsoid, gaussian, radius or none; default: ellipsoid."
         ),
     ] = None,
     fusion: Annotated[

@@ -27,7 +27,7 @@ from oracles import Cell, cell_boxes, in_map, said, shifted, turned
 from strategies import flat_view, rngs, views
 
 RESOLUTION = 0.125
-MODELS = ["ellipsoid", "radius", "none"]
+MODELS = ["ellipsoid", "radius", "none"]  # of constant density
 SLACK = 1e-9  # [m], what rounding may add to a cell
 
 
