@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from groundmap.arrays import Floats, Ints
-from groundmap.evidence.image_plane.patches import ImageMesh, Patches, PatchKind, edge_numbers
+from groundmap.evidence.image_plane.patches import ImageMesh, Patches, PatchKind
 from groundmap.settings import MapperSettings
 
 STEP = 0.5  # [voxels] between places along an edge
@@ -51,7 +51,7 @@ def _edges(image: ImageMesh, patches: Patches) -> Ints:
     """Return the believed edges without a surface, and lone vertices as edges of no length."""
     edges = image.mesh.edges
     covered = np.zeros(len(edges), dtype=np.bool_)
-    covered[edge_numbers(image.mesh)[patches.kind == PatchKind.SURFACE].reshape(-1)] = True
+    covered[patches.edges[patches.kind == PatchKind.SURFACE].reshape(-1)] = True
     lone = np.ones(len(image.mesh.points), dtype=np.bool_)
     lone[edges[patches.believed]] = False
     single = np.flatnonzero(lone)

@@ -60,8 +60,8 @@ def evidence_of(
     _block(cells, grid)  # before lines are cut into voxels
     lone = lone_surfaces_of(image, patches, settings)
     room = standing_room(view, grid, settings)
-    on_lines = (lone.places.reshape(-1, 3) + camera - grid.origin) / grid.resolution
-    lower, shape = _block(np.concatenate([cells, on_lines, room, room + 1]), grid)
+    on_lines = (_extent(lone.places.reshape(-1, 3)) + camera - grid.origin) / grid.resolution
+    lower, shape = _block(np.concatenate([cells, on_lines, _extent(room), _extent(room + 1)]), grid)
     z = np.zeros(shape[::-1], dtype=np.float32)
     falloff = MODELS[settings.uncertainty].falloff.astype(np.float32)
     if len(patches.kind):
@@ -107,18 +107,29 @@ def _outer(patches: Patches, settings: MapperSettings) -> Floats:
 
 
 def _reached(image: ImageMesh, patches: Patches, outer: Floats, settings: MapperSettings) -> Floats:
-    """Return places around all that the patches may say something about, (n, 3) [m, camera]."""
+    """Return the box of all that the patches may say something about, shape (2, 3) [m, camera]."""
     some = patches.kind != PatchKind.NOTHING
-    rays = image.rays(image.vertices.px[image.mesh.simplices[some]])
-    length = np.sqrt((rays**2).sum(axis=2))
-    unit = rays / length[..., None]
-    cosine = (unit * np.roll(unit, 1, axis=1)).sum(axis=2).min(axis=1, initial=1.0)
+    vertex_rays = image.rays(image.vertices.px)
+    vertex_length = np.sqrt((vertex_rays**2).sum(axis=1))
+    corners = image.mesh.simplices[some]
+    rays, length = vertex_rays[corners], vertex_length[corners]
+    a, b, c = np.moveaxis(rays / length[..., None], 1, 0)
+    cosines = [np.einsum("ij,ij->i", *pair) for pair in ((a, b), (b, c), (c, a))]
+    cosine = np.minimum.reduce(cosines)
     # Between its corners, a triangle's part within max_range bulges by at most this.
     bulge = settings.max_range / np.sqrt(np.maximum(cosine, LEAST_COSINE))
     depth = np.minimum(bulge[:, None] / length, outer[some][:, None])
     reached = (rays * depth[..., None]).reshape(-1, 3)
     clipped: Floats = np.clip(reached, -settings.max_range, settings.max_range)
-    return clipped
+    return _extent(clipped)
+
+
+def _extent(places: Floats) -> Floats:
+    """Return the lower and upper corner of the box around places, shape (2, 3); (0, 3) of none."""
+    if len(places) == 0:
+        return places.reshape(0, 3)
+    x, y, z = places.T
+    return np.array([(x.min(), y.min(), z.min()), (x.max(), y.max(), z.max())])
 
 
 def _block(cells: Floats, grid: ConfidenceGrid) -> tuple[Floats, Ints]:

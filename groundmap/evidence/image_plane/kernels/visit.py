@@ -166,8 +166,9 @@ def _visit(
                 ahead = r02 * x + r12 * y + r22 * z
                 if ahead <= 0.0 or x * x + y * y + z * z > reach * reach:
                     continue
-                u = (r00 * x + r10 * y + r20 * z) / ahead
-                v = (r01 * x + r11 * y + r21 * z) / ahead
+                closeness = 1.0 / ahead
+                u = (r00 * x + r10 * y + r20 * z) * closeness
+                v = (r01 * x + r11 * y + r21 * z) * closeness
                 col, row = (u - left) * per_cell, (v - top) * per_cell
                 if not (0.0 <= col < width and 0.0 <= row < height):
                     continue
