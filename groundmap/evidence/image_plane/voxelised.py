@@ -124,12 +124,12 @@ def _reached(image: ImageMesh, patches: Patches, outer: Floats, settings: Mapper
     return _extent(clipped)
 
 
-def _extent(places: Floats) -> Floats:
+def _extent(places: Floats | Ints) -> Floats:
     """Return the lower and upper corner of the box around places, shape (2, 3); (0, 3) of none."""
     if len(places) == 0:
-        return places.reshape(0, 3)
+        return np.empty((0, 3))
     x, y, z = places.T
-    return np.array([(x.min(), y.min(), z.min()), (x.max(), y.max(), z.max())])
+    return np.array([(x.min(), y.min(), z.min()), (x.max(), y.max(), z.max())], dtype=np.float64)
 
 
 def _block(cells: Floats, grid: ConfidenceGrid) -> tuple[Floats, Ints]:
