@@ -36,7 +36,9 @@ def examples() -> list[tuple[str, str]]:
 
 
 @pytest.mark.parametrize(
-    ("code", "answer"), examples(), ids=["first", "planners", "areas", "sampling"]
+    ("code", "answer"),
+    examples(),
+    ids=["first", "voxels", "planners", "areas", "sampling"],
 )
 def test_an_example_prints_its_answer(code: str, answer: str) -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

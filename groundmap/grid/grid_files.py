@@ -9,6 +9,7 @@ from groundmap.arrays import Floats, Ints, as_cells, as_floats, check_finite
 from groundmap.errors import FileFormatError
 from groundmap.files.archive import read_archive, write_archive
 from groundmap.grid.arguments import as_origin, as_resolution, check_frame
+from groundmap.grid.collapse import as_planes
 from groundmap.grid.fusion import rule_from
 from groundmap.grid.height_layers import HeightLayers
 from groundmap.grid.old_versions import upgrade
@@ -25,6 +26,7 @@ class GridContent(NamedTuple):
     layers: HeightLayers
     trajectory: Floats  #: shape (n, 3): x, y [m], yaw [rad], in the map frame
     recent: Ints  #: shape (n, d), cells that the newest views saw as non-free
+    planes: Floats  #: shape (k, 6), see `groundmap.ConfidenceGrid.planes`
 
 
 def write_grid(path: str | PathLike[str], content: GridContent) -> None:
@@ -53,6 +55,7 @@ def write_grid(path: str | PathLike[str], content: GridContent) -> None:
         **content.layers.to_arrays(),
         "trajectory": content.trajectory,
         "recent": content.recent,
+        "planes": content.planes,
     }
     write_archive(path, header, arrays)
 
@@ -79,6 +82,7 @@ def read_grid(path: str | PathLike[str]) -> GridContent:
         trajectory = as_floats("trajectory", arrays["trajectory"], (None, 3))
         check_finite("trajectory", trajectory)
         recent = as_cells("recent", arrays["recent"], ndim)
+        planes = as_planes(arrays.get("planes", ()))  # older files have none
     except (KeyError, TypeError, ValueError) as error:
         raise FileFormatError(path, "a complete map file", f"{error}") from error
-    return GridContent(settings, tiles, layers, trajectory, recent)
+    return GridContent(settings, tiles, layers, trajectory, recent, planes)

@@ -192,7 +192,11 @@ def as_heights(height: npt.ArrayLike, shape: tuple[int, ...]) -> Floats32:
     InputError
         The array has another shape, is not numeric or contains NaN.
     """
-    array = np.asarray(height)
+    try:
+        array = np.asarray(height)
+    except ValueError as error:  # rows of different lengths
+        got = repr(height)[:60]
+        raise InputError("height", f"heights of shape {shape} [m]", got) from error
     if array.shape != shape or array.dtype.kind not in "iuf" or np.isnan(array).any():
         got = f"{array.dtype} of shape {array.shape}" + (
             " with NaN" if array.dtype.kind == "f" and np.isnan(array).any() else ""

@@ -11,7 +11,7 @@ import typer
 from groundmap import draw
 from groundmap.evaluate.protocols import Verdict, evaluate
 from planners.commands.console import JsonOption, emit, emit_columns, show_progress
-from planners.commands.settings_file import ConfigOption, read_settings
+from planners.commands.settings_file import ConfigOption, ModeOption, read_settings
 from planners.commands.sources import (
     CameraHeightOption,
     FormatOption,
@@ -37,10 +37,14 @@ def evaluate_command(
     plot: Annotated[
         Path | None, typer.Option(help="Draw the map and the held-out features: .png, .pdf, .svg.")
     ] = None,
+    mode: ModeOption = None,
     config: ConfigOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Judge maps of a log by features held out of them; figures are shares from 0 to 1."""
+    """Judge maps of a log by features held out of them; figures are shares from 0 to 1.
+
+    A 3-D map is judged by its collapse to 2-D.
+    """
     if plot is not None:
         draw.check_picture(plot)
     opened = open_source(
@@ -63,7 +67,7 @@ def evaluate_command(
         watch=watch,
         ground=settings["ground"],
         camera_height=opened.camera_height,
-        **settings["mapper"],
+        **settings["mapper"] | ({} if mode is None else {"mode": mode}),
     )
     if plot is not None:
         _draw(verdicts["views"], plot)

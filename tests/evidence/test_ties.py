@@ -7,7 +7,7 @@ import pytest
 
 from groundmap import Features, GroundMapper, GroundPlane, StereoRig, View
 from groundmap.arrays import Floats
-from groundmap.mapper import ViewParts
+from groundmap.evidence.ground_plane.view_parts import ViewParts
 from groundmap.view.frames import map_from_world
 
 RIG = StereoRig(fx=700.0, fy=700.0, cx=320.0, cy=240.0, baseline=0.5)

@@ -29,6 +29,7 @@ from groundmap import (
     write_views,
 )
 from groundmap.evaluate.protocols import evaluate
+from groundmap.grid.collapse import as_planes
 from groundmap.grid.fusion import Average, Capped
 from groundmap.io import export
 from groundmap.simulate import (
@@ -230,9 +231,17 @@ def _area(draw: Draw, on: ConfidenceGrid, _low: Any, _side: float, _folder: Path
     on.area(draw.pick(list(CellState)))
 
 
+def _collapse(draw: Draw, on: ConfidenceGrid, _low: Any, _side: float, _folder: Path) -> None:
+    planes = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 1.0]])
+    on.planes = as_planes(draw.noted("planes", array(draw, planes, 0.4)))
+    low = draw.noted("low", number(draw, 0.0, 0.3))
+    doubtful = draw.noted("doubtful", number(draw, 0.0, 1.0))
+    use_map(on.collapse(low=low, free_below=0.5, high=2.0, doubtful=doubtful))
+
+
 QUERIES = {
-    "area": _area, "at": _at, "export": _export, "fuse": _fuse, "fuse heights": _fuse_heights,
-    "merge": _merge, "tile": _tile, "window": _window,
+    "area": _area, "at": _at, "collapse": _collapse, "export": _export, "fuse": _fuse,
+    "fuse heights": _fuse_heights, "merge": _merge, "tile": _tile, "window": _window,
 }  # fmt: skip
 PATHS = (
     "", ".", "nothing", "a\x00b", "\ud800", "\u202e.map", "x" * 300, "x" * 5000, "/dev/null", "/",

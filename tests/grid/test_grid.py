@@ -711,3 +711,10 @@ def test_a_block_has_one_lower_cell(lower: Any) -> None:
     grid = ConfidenceGrid(resolution=0.5)
     with pytest.raises(InputError, match=r"^lower: expected 2 whole numbers, got \d cells"):
         grid.fuse(lower, np.full((2, 2), -1.0, dtype=np.float32))
+
+
+def test_heights_of_uneven_rows_are_refused() -> None:
+    z = np.full((2, 2), -0.5, dtype=np.float32)
+    uneven: Any = [[0.1, 0.2], [0.3]]
+    with pytest.raises(InputError, match=r"height: expected heights of shape \(2, 2\) \[m\]"):
+        ConfidenceGrid().fuse(np.array([0, 0]), z, uneven)

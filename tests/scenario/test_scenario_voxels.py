@@ -44,7 +44,7 @@ def simulated() -> Simulated:
     grid.fuse(box.lower, np.where(blocked, 1.0, -1.0).astype(np.float32))
     window = _window(WORLD, grid, (0.15, 2.4))
     truth = voxel_truth_of(WORLD, moves(), SensorSettings(), window, MapperSettings())
-    return Simulated(WORLD, grid, window, truth)
+    return Simulated(WORLD, grid, window, truth, np.zeros(window.count.shape, dtype=np.bool_))
 
 
 def test_voxels_are_measured_whose_centres_are_between_the_heights(simulated: Simulated) -> None:

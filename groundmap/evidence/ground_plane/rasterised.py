@@ -62,12 +62,9 @@ def evidence_of(
     to_cells = _CellsOf(ground_view, grid)
     origin = to_cells(np.zeros((1, 2)))[0]
     firm = np.flatnonzero(surfaces.kind != SurfaceKind.DOUBTFUL)
-    cores, reach = surfaces.cores[firm], surfaces.reach[firm]
-    spread = model.outline(cores, reach)
-    sides = _within(spread, settings.max_range)
-    free, ends, cores, outlines, sides = map(
-        to_cells, (fan.free, surfaces.ends[firm], cores, spread, sides)
-    )
+    firm_cores, reach = surfaces.cores[firm], surfaces.reach[firm]
+    spread = model.outline(firm_cores, reach)
+    free, ends, cores, outlines = map(to_cells, (fan.free, surfaces.ends[firm], firm_cores, spread))
     caps = model.caps(reach) / grid.resolution
     discs = surfaces.discs[firm] / grid.resolution
     wheels, half_width = (
@@ -114,21 +111,24 @@ def evidence_of(
         z *= np.clip(surest, LEAST_SURE, 1.0, dtype=np.float32)
     for wheel in wheels - lower:
         roll_over(z, height, wheel, half_width)
-    draw_surfaces(
-        z,
-        height,
-        ends - lower,
-        cores - lower,
-        outlines - lower,
-        sides - lower,
-        caps,
-        discs,
-        on_surface * belief,
-        around * belief,
-        surfaces.tops[firm].max(axis=1),
-        origin - lower,
-        farthest,
-    )
+    for shell, share in enumerate(model.falloff, start=1):
+        within = reach * (shell / len(model.falloff))
+        spread = model.outline(firm_cores, within)
+        draw_surfaces(
+            z,
+            height,
+            ends - lower,
+            cores - lower,
+            to_cells(spread) - lower,
+            to_cells(_within(spread, settings.max_range)) - lower,
+            model.caps(within) / grid.resolution,
+            discs,
+            on_surface * belief,
+            share * around * belief,
+            surfaces.tops[firm].max(axis=1),
+            origin - lower,
+            farthest,
+        )
     evidence = Evidence(lower[::-1].astype(np.int64), z, height)
     return with_drop_offs(evidence, ground_view, grid)
 
