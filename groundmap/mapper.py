@@ -9,13 +9,8 @@ from typing import Any
 import numpy as np
 
 from groundmap.arrays import Floats, Ints
+from groundmap.evidence.builders import BUILDERS
 from groundmap.evidence.evidence import Evidence
-from groundmap.evidence.ground_plane.height_classes import GroundView, flatten
-from groundmap.evidence.ground_plane.rasterised import evidence_of
-from groundmap.evidence.ground_plane.ray_smoothing import smooth_features
-from groundmap.evidence.ground_plane.surfaces import Surfaces, find_surfaces
-from groundmap.evidence.ground_plane.visibility import SightFan, visible_freespace
-from groundmap.evidence.triangulation import Mesh, triangulate
 from groundmap.grid.fusion import RULES
 from groundmap.grid.grid import ConfidenceGrid
 from groundmap.settings import MapperSettings
@@ -40,30 +35,21 @@ class MapperStats:
     through_viewpoint: int = 0  #: links and segments nearer than min_range
 
 
-@dataclass(frozen=True)
-class ViewParts:
-    """Intermediate results of the mapping of one view, in the order of the steps."""
-
-    ground_view: GroundView  #: features by height class, in the ground plane
-    mesh: Mesh  #: triangulation of the obstacle features
-    surfaces: Surfaces  #: links, segments and single features that end lines of sight
-    fan: SightFan  #: visible freespace by bearing
-    evidence: Evidence  #: update of the grid's cells
-
-
 class GroundMapper:
-    """Mapper that fuses views into a 2-D confidence grid (paper, sections 3, 5.2 and 7).
+    """Mapper that fuses views into a confidence grid, 2-D or 3-D (paper, sections 3, 5.2 and 7).
 
     Each view is evidence for free cells, which its lines of sight pass over, and for non-free
     cells, which its obstacle features are in. `integrate` adds the evidence of a view to `grid`.
+    In 2-D (the default) features are triangulated in the ground plane, with ``mode="3d"`` in the
+    image plane.
 
     Parameters
     ----------
     stages : Stopwatch, optional
         Stopwatch for the time of each step, if it is shared with other code.
     **settings
-        Fields of `groundmap.MapperSettings`: ``resolution`` [m], ``fusion``, ``uncertainty``,
-        ``max_range`` [m], ``step_height`` [m], ...
+        Fields of `groundmap.MapperSettings`: ``mode``, ``resolution`` [m], ``fusion``,
+        ``uncertainty``, ``max_range`` [m], ``step_height`` [m], ...
 
     Attributes
     ----------
@@ -73,8 +59,6 @@ class GroundMapper:
     stats : MapperStats
         Numbers of views and of used and dropped features.
     stages : Stopwatch
-    changed : ndarray, shape (n, 2)
-        Cells ``[row, col]`` that the last view changed, for incremental planners.
 
     Raises
     ------
@@ -98,15 +82,27 @@ class GroundMapper:
     def __init__(self, *, stages: Stopwatch | None = None, **settings: Any) -> None:
         self.settings = MapperSettings(**settings)
         parameters = {"cap": self.settings.cap} if self.settings.fusion == "capped" else {}
+        self._builder = BUILDERS[self.settings.mode]
         self.grid = ConfidenceGrid(
             resolution=self.settings.resolution,
+            origin=(0.0,) * self._builder.ndim,
             frame=self.settings.frame,
             rule=RULES[self.settings.fusion](**parameters),
             heights=tuple(share * self.settings.step_height for share in SIGHT_STEPS),
         )
         self.stats = MapperStats()
         self.stages = stages or Stopwatch()
-        self.changed: Ints = np.empty((0, 2), dtype=np.int64)
+        self._last: Evidence | None = None
+
+    @property
+    def changed(self) -> Ints:
+        """Cells ``[row, col]`` that the last view changed, shape (n, 2), for incremental planners.
+
+        On a 3-D map ``[layer, row, col]``, shape (n, 3).
+        """
+        if self._last is None:
+            return np.empty((0, self.grid.ndim), dtype=np.int64)
+        return self._last.cells()
 
     def integrate(self, view: View) -> None:
         """Add the evidence of one view to the grid; a refused view does not change the grid.
@@ -114,47 +110,45 @@ class GroundMapper:
         Parameters
         ----------
         view : View
-            With a ground plane, as from `groundmap.fit_ground`.
+            With a ground plane, as from `groundmap.fit_ground`. A 3-D map needs none, but can be
+            collapsed to 2-D only where views have one.
 
         Raises
         ------
         NoGroundPlaneError
             The view has no ground plane, or one that is not below its camera, or the camera looks
-            at the ground or the sky.
+            at the ground or the sky (2-D maps only).
         InputError
             The view would need more cells than a map can have.
         """
         parts = self.explain(view)
         with self.stages.measure("fuse"):
             self.grid.fuse(*parts.evidence)
-            self.changed = parts.evidence.cells()
+            self._last = parts.evidence
             self.grid.trajectory = np.concatenate([self.grid.trajectory, _pose2d(view)])
+            self.grid.planes = np.concatenate([self.grid.planes, parts.planes])
+        counts = parts.counts
         self.stats.views += 1
-        self.stats.features_used += parts.ground_view.used
-        self.stats.features_dropped.update(parts.ground_view.dropped)
-        self.stats.seen_through += parts.fan.contradictions.features
-        self.stats.through_viewpoint += parts.surfaces.through_viewpoint
+        self.stats.features_used += counts.used
+        self.stats.features_dropped.update(counts.dropped)
+        self.stats.seen_through += counts.seen_through
+        self.stats.through_viewpoint += counts.through_viewpoint
 
-    def explain(self, view: View) -> ViewParts:
+    def explain(self, view: View) -> Any:
         """Return the evidence of one view with all intermediate results, without fusing it.
 
         Parameters
         ----------
         view : View
-            With a ground plane, as from `groundmap.fit_ground`.
+            With a ground plane, as from `groundmap.fit_ground`; a 3-D map needs none.
+
+        Returns
+        -------
+        ViewParts or ImageParts
+            Of `groundmap.evidence.ground_plane.view_parts` on a 2-D map, of
+            `groundmap.evidence.image_plane.view_parts` on a 3-D map.
         """
-        with self.stages.measure("heights"):
-            ground_view = flatten(view, self.settings, number=self.stats.views)
-            ground_view = smooth_features(ground_view, self.settings)
-        with self.stages.measure("triangulate"):
-            mesh = triangulate(ground_view.points, ground_view.segments)
-        with self.stages.measure("surfaces"):
-            surfaces = find_surfaces(ground_view, mesh, self.settings)
-        with self.stages.measure("sight"):
-            fan = visible_freespace(ground_view, surfaces, self.settings)
-        with self.stages.measure("evidence"):
-            evidence = evidence_of(ground_view, surfaces, fan, self.grid, self.settings)
-        return ViewParts(ground_view, mesh, surfaces, fan, evidence)
+        return self._builder.build(view, self.grid, self.settings, self.stages, self.stats.views)
 
 
 def _pose2d(view: View) -> Floats:

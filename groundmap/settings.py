@@ -105,7 +105,10 @@ class MapperSettings(Settings):
     """
 
     resolution: float = Field(0.1524, gt=0, le=1000, description="side of a cell [m]; 6 inches")
-    mode: Literal["2d"] = Field("2d", description="kind of map: 2-D in the ground plane ('2d')")
+    mode: Literal["2d", "3d"] = Field(
+        "2d",
+        description="kind of map: cells of the ground plane ('2d'), or voxels ('3d')",
+    )
     frame: str = Field("map", description="name of the coordinate frame of the map")
     fusion: Literal["average", "capped"] = Field(
         "average",
@@ -114,10 +117,11 @@ class MapperSettings(Settings):
     cap: int = Field(
         50, ge=1, le=2**32 - 1, description="update count from which 'capped' forgets old views"
     )
-    uncertainty: Literal["ellipsoid", "radius", "none"] = Field(
+    uncertainty: Literal["ellipsoid", "gaussian", "radius", "none"] = Field(
         "ellipsoid",
-        description="spread of surfaces over cells: by their covariance ('ellipsoid'), equal in "
-        "all directions ('radius'), or 'none'",
+        description="spread of surfaces over cells: by their covariance ('ellipsoid'), the same "
+        "with most of it near the surface ('gaussian'), equal in all directions ('radius'), or "
+        "'none'",
     )
     spread_sigmas: float = Field(
         2.0, ge=0, le=LARGEST, description="extent of this spread [standard deviations]"
@@ -188,6 +192,23 @@ class MapperSettings(Settings):
     )
     support_angle: float = Field(
         0.05, gt=0, le=LARGEST, description="upper bound of this half-width as an angle [rad]"
+    )
+
+    discontinuities: Literal["halo", "cautious", "strict"] = Field(
+        "halo",
+        description="3-D: sight over a gap in depth ends at near corners within `depth_halo`, "
+        "elsewhere at far ones ('halo'), or at the nearest corner ('cautious'), or the gap is a "
+        "surface like any other ('strict')",
+    )
+    depth_ratio: float = Field(
+        1.3, ge=1, le=LARGEST, description="3-D: ratio of depths from which there is a gap"
+    )
+    depth_halo: float = Field(
+        0.8,
+        ge=0,
+        le=LARGEST,
+        description="3-D: lines of sight that pass this near to the near corner of a gap in depth "
+        "end there [m]",
     )
 
     def check(self) -> None:

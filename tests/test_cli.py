@@ -364,7 +364,7 @@ def test_without_json_a_refusal_leaves_stdout_empty() -> None:
 def test_without_arguments_it_prints_help() -> None:
     ran = run()
     assert (ran.code, ran.err) == (0, "")
-    for command in ("demo", "map", "plan", "plot", "info", "convert"):
+    for command in ("demo", "map", "plan", "plot", "info", "collapse", "convert"):
         assert f"\n  {command} " in ran.out
 
 
@@ -376,6 +376,7 @@ def test_without_arguments_it_prints_help() -> None:
         ("plan", ("Start [m, rad; map]", "Goal [m, rad; map]", "robot [m]", "planning [s]")),
         ("plot", ("draw [m]", "route [m]")),
         ("info", ("areas [m²]", "bounds [m]")),
+        ("collapse", ("over [m]", "robot [m]", "height [m]")),
         ("convert", ()),
     ],
 )

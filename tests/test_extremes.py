@@ -129,7 +129,7 @@ def test_pixels_whose_covariance_overflows_are_dropped() -> None:
 
 
 @pytest.mark.parametrize("sigma", [10.0, 19.0, 1e4, 1e150])
-@pytest.mark.parametrize("model", ["ellipsoid", "radius", "none"])
+@pytest.mark.parametrize("model", ["ellipsoid", "gaussian", "radius", "none"])
 def test_depths_of_any_uncertainty_make_no_kilometres_of_cells(sigma: float, model: str) -> None:
     covariance = np.diag([1e-4, 1e-4, sigma**2])[None]
     mapper = mapped(view_of([(0.5, 0.5, 5.0)], covariance), uncertainty=model)

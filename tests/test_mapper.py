@@ -300,7 +300,7 @@ A = (2.0, 0.0, 0.5)
     st.lists(segment_places, max_size=5),
     st.sampled_from([0.0, 30.0, 45.0, -30.0]),
     sigmas,
-    st.sampled_from(["ellipsoid", "radius", "none"]),
+    st.sampled_from(["ellipsoid", "gaussian", "radius", "none"]),
 )
 @settings(max_examples=300)
 @example([], [], 0.0, 0.05, "ellipsoid")

@@ -35,7 +35,9 @@ def examples() -> list[tuple[str, str]]:
     return re.findall(r"```python\n(.*?)```\s+```\n(.*?)```", text, re.DOTALL)
 
 
-@pytest.mark.parametrize(("code", "answer"), examples(), ids=["first", "planners", "sampling"])
+@pytest.mark.parametrize(
+    ("code", "answer"), examples(), ids=["first", "voxels", "planners", "sampling"]
+)
 def test_an_example_prints_its_answer(code: str, answer: str) -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == answer

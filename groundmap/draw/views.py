@@ -8,8 +8,8 @@ import numpy as np
 
 from groundmap.arrays import Floats
 from groundmap.evidence.ground_plane.surfaces import SurfaceKind
+from groundmap.evidence.ground_plane.view_parts import ViewParts
 from groundmap.grid.grid import ConfidenceGrid
-from groundmap.mapper import ViewParts
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

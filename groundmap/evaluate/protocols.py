@@ -132,18 +132,18 @@ def _select(view: View, keep: Bools) -> View:
 
 
 def _map(views: Iterable[View], settings: dict[str, Any], ground: dict[str, Any]) -> ConfidenceGrid:
-    """Return a map of views, with ground planes fitted to these views alone."""
+    """Return a map of views in 2-D, with ground planes fitted to these views alone."""
     mapper = GroundMapper(**settings)
     for view in fit_ground(views, **ground):
         mapper.integrate(view)
-    return mapper.grid
+    return mapper.grid.collapse(low=mapper.settings.step_height, high=mapper.settings.robot_height)
 
 
 def _stamp(
     views: Iterable[View], settings: dict[str, Any], _ground: dict[str, Any]
 ) -> ConfidenceGrid:
     """Return a map of discs, free at ground features and non-free at obstacles."""
-    grid = GroundMapper(**settings).grid
+    grid = GroundMapper(**{**settings, "mode": "2d"}).grid
     for view in views:
         features = sort_by_height([view])
         xy = np.concatenate([features.grounds, features.obstacles])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import NamedTuple
 
 import numpy as np
@@ -16,11 +17,22 @@ class Evidence(NamedTuple):
     discarded after fusion.
     """
 
-    lower: Ints  #: shape (2,), cell ``[row, col]`` of the block's first entry
-    z: Floats32  #: shape (rows, cols), in [-1, 1]; 0 for no evidence
-    #: shape (rows, cols) [m], see `groundmap.ConfidenceGrid.fuse`; None without heights
+    lower: (
+        Ints  #: shape (d,), cell of the first entry: ``[row, col]``, in 3-D ``[layer, row, col]``
+    )
+    z: Floats32  #: shape (rows, cols), in 3-D (layers, rows, cols), in [-1, 1]; 0 for no evidence
+    #: shape of `z` [m], see `groundmap.ConfidenceGrid.fuse`; None without heights
     height: Floats32 | None = None
 
     def cells(self) -> Ints:
-        """Return the cells ``[row, col]`` with evidence, shape (n, 2)."""
+        """Return the cells ``[row, col]`` with evidence, shape (n, d)."""
         return np.argwhere(self.z != 0) + self.lower
+
+
+class Counts(NamedTuple):
+    """Number of features of one view by their use."""
+
+    used: int  #: features that became evidence
+    dropped: Counter[str]  #: other features, by reason
+    seen_through: int = 0  #: features behind a surface, with a line of sight below its top
+    through_viewpoint: int = 0  #: links and segments nearer than min_range

@@ -33,16 +33,20 @@ class Mesh(NamedTuple):
     )
 
 
-def triangulate(points: npt.ArrayLike, segments: npt.ArrayLike = ()) -> Mesh:
+def triangulate(
+    points: npt.ArrayLike, segments: npt.ArrayLike = (), *, merge_distance: float = MERGE_DISTANCE
+) -> Mesh:
     """Return the triangulation of points in which every segment is a chain of edges.
 
     Parameters
     ----------
     points : array_like, shape (n, 2) [m]
-        Points within a millimetre of each other become one vertex.
+        In metres, or in another unit, such as pixels.
     segments : array_like of int, shape (m, 2)
         Rows of `points`. Crossing segments are split at the crossing; overlapping segments share
         edges; segments whose ends are one vertex are dropped.
+    merge_distance : float, default 0.001
+        Points within this distance of each other become one vertex.
 
     Raises
     ------
@@ -81,7 +85,7 @@ def triangulate(points: npt.ArrayLike, segments: npt.ArrayLike = ()) -> Mesh:
         )
     if len(xy) == 0:
         return _nothing()
-    vertices, source = _merge_duplicates(xy)
+    vertices, source = _merge_duplicates(xy, merge_distance)
     constraints = np.sort(source[pairs], axis=1)
     constraints = np.unique(constraints[constraints[:, 0] != constraints[:, 1]], axis=0)
     try:
@@ -103,32 +107,32 @@ def _nothing() -> Mesh:
     )
 
 
-def _merge_duplicates(xy: Floats) -> tuple[Floats, Ints]:
+def _merge_duplicates(xy: Floats, merge_distance: float) -> tuple[Floats, Ints]:
     """Return the vertices and, for each point, the number of its vertex.
 
-    The first of a group of near points replaces those within a millimetre of it. No point moves
-    farther, even in long chains of near points.
+    The first of a group of near points replaces those within `merge_distance` of it. No point
+    moves farther, even in long chains of near points.
     """
     _, first, group = np.unique(xy, axis=0, return_index=True, return_inverse=True)
     distinct = np.sort(first)
     stands_for = np.arange(len(xy))
-    stands_for[distinct] = distinct[_first_nearby(xy[distinct])]
+    stands_for[distinct] = distinct[_first_nearby(xy[distinct], merge_distance)]
     stands_for = stands_for[first[group.reshape(-1)]]
     kept = np.unique(stands_for)
     return xy[kept], np.searchsorted(kept, stands_for)
 
 
-def _first_nearby(xy: Floats) -> Ints:
-    """Return, for each of distinct points, the first kept point within a millimetre, or itself.
+def _first_nearby(xy: Floats, merge_distance: float) -> Ints:
+    """Return, for each of distinct points, the first kept point nearby, or itself.
 
-    A point is kept if no earlier point within a millimetre is kept.
+    A point is kept if no earlier point within `merge_distance` is kept.
     """
     stands_for = np.arange(len(xy))
     # Twice the distance, as the search excludes points on its bound.
-    apart, _ = KDTree(xy).query(xy, k=[2], distance_upper_bound=2 * MERGE_DISTANCE)
+    apart, _ = KDTree(xy).query(xy, k=[2], distance_upper_bound=2 * merge_distance)
     crowded = np.flatnonzero(np.isfinite(apart[:, 0]))
-    # A square of a millimetre holds at most four kept points, which bounds the work per point.
-    squares = np.floor(xy[crowded] / MERGE_DISTANCE).tolist()
+    # A square of that side holds at most four kept points, which bounds the work per point.
+    squares = np.floor(xy[crowded] / merge_distance).tolist()
     kept: dict[tuple[float, float], list[tuple[int, float, float]]] = {}
     for point, (x, y), (col, row) in zip(
         crowded.tolist(), xy[crowded].tolist(), squares, strict=True
@@ -137,7 +141,7 @@ def _first_nearby(xy: Floats) -> Ints:
             number
             for i, j in NINE_SQUARES
             for number, a, b in kept.get((col + i, row + j), ())
-            if (a - x) ** 2 + (b - y) ** 2 <= MERGE_DISTANCE**2
+            if (a - x) ** 2 + (b - y) ** 2 <= merge_distance**2
         ]
         if near:
             stands_for[point] = min(near)

@@ -9,6 +9,8 @@ import numpy as np
 from groundmap.arrays import Floats
 
 PEAK = 4.0  # ratio of z on a surface to z around it
+SHELLS = 4  # steps in which a Gaussian decreases
+SPREAD = 2.0  # standard deviations of a Gaussian to its end
 
 
 class Ellipsoid:
@@ -26,13 +28,19 @@ class Ellipsoid:
 
         Parameters
         ----------
-        xy : ndarray, shape (n, 2) [m, view]
-        covariance : ndarray, shape (n, 2, 2) [m², view]
+        xy : ndarray, shape (n, d) [m]
+            From the viewpoint.
+        covariance : ndarray, shape (n, d, d) [m²]
         """
         ray = _unit(xy)
         variance = np.einsum("ni,nij,nj->n", ray, covariance, ray)
         sigma: Floats = np.sqrt(np.maximum(variance, 0.0))  # rounding may give values below 0
         return sigma
+
+    @property
+    def falloff(self) -> Floats:
+        """z in equal shells of the spread, from the surface outwards, as a share of `evidence`."""
+        return np.ones(1)
 
     def core_radius(self, resolution: float) -> float:
         """Return the half-width of the core of a lone point, half a cell [m]."""
@@ -133,7 +141,37 @@ class Exact(Ellipsoid):
         return np.zeros(len(xy))
 
 
-MODELS: dict[str, Ellipsoid] = {model.name: model for model in (Ellipsoid(), Radius(), Exact())}
+class Gaussian(Ellipsoid):
+    """A Gaussian along the line of sight, which is truncated where the ellipsoid ends.
+
+    Around the surface, z decreases from it in steps; along a ray it sums to one cell of surface.
+    """
+
+    name: ClassVar[str] = "gaussian"
+
+    @property
+    def falloff(self) -> Floats:
+        """z in equal shells of the spread, from the surface outwards, as a share of `evidence`."""
+        middles = (np.arange(SHELLS) + 0.5) * (SPREAD / SHELLS)
+        heights = np.exp(-0.5 * middles**2)
+        falloff: Floats = heights / heights[0]
+        return falloff
+
+    def evidence(self, reach: Floats, resolution: float) -> tuple[Floats, Floats]:
+        """Return z on the surface and in the innermost shell around it, shape (s,) each.
+
+        Parameters
+        ----------
+        reach : ndarray, shape (s, k) [m]
+        resolution : float [m]
+        """
+        density = _constant_density(reach, resolution)
+        return np.minimum(PEAK * density, 1.0), np.minimum(density / self.falloff.mean(), 1.0)
+
+
+MODELS: dict[str, Ellipsoid] = {
+    model.name: model for model in (Ellipsoid(), Radius(), Exact(), Gaussian())
+}
 
 
 def _constant_density(reach: Floats, resolution: float) -> Floats:
@@ -147,6 +185,6 @@ def _quadrangle(near: Floats, far: Floats) -> Floats:
 
 
 def _unit(vectors: Floats) -> Floats:
-    length = np.hypot(vectors[..., 0], vectors[..., 1])[..., None]
+    length = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None]
     unit: Floats = vectors / np.where(length > 0, length, 1.0)
     return unit

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import Floats, as_floats, check_finite, is_number
+from groundmap.arrays import Floats, Floats32, as_floats, check_finite, is_number
 from groundmap.errors import InputError, MergeError
+from groundmap.grid.kernels.fuse import beyond_one
 from groundmap.grid.tiles import TILE_SHAPES
 from groundmap.printable import format_value, is_plain
 
@@ -62,7 +63,7 @@ def as_origin(origin: npt.ArrayLike) -> Floats:
     return corner
 
 
-def as_evidence(z: npt.ArrayLike, ndim: int) -> npt.NDArray[Any]:
+def as_evidence(z: npt.ArrayLike, ndim: int) -> Floats32:
     """Return the evidence of a block of cells as an array of numbers in [-1, 1].
 
     Parameters
@@ -84,9 +85,11 @@ def as_evidence(z: npt.ArrayLike, ndim: int) -> npt.NDArray[Any]:
         raise InputError("z", expected, format_value(z)) from error
     if block.ndim != ndim or block.dtype.kind not in "biuf":
         raise InputError("z", expected, f"{block.dtype} of shape {block.shape}")
-    if not (np.abs(block) <= 1.0).all():
+    # Before the conversion, which would round numbers just beyond 1.
+    wide = block if block.dtype == np.float32 else block.astype(np.float64)
+    if beyond_one(wide.reshape(-1)):
         raise InputError("z", "evidence in [-1, 1]", "NaN or numbers beyond")
-    return block
+    return np.ascontiguousarray(block, dtype=np.float32)
 
 
 def check_merge(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> None:

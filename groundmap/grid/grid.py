@@ -18,6 +18,7 @@ from groundmap.grid.arguments import (
     check_frame,
     check_merge,
 )
+from groundmap.grid.collapse import as_band, as_planes, collapse_tiles
 from groundmap.grid.extents import cells_of_box, check_size, check_whole
 from groundmap.grid.fusion import Average, UpdateRule
 from groundmap.grid.grid_files import GridContent, read_grid, write_grid
@@ -74,6 +75,9 @@ class ConfidenceGrid:
         self._layers = HeightLayers(len(origin), heights)
         #: Base poses of the views, shape (n, 3): x, y [m], yaw [rad], in the map frame.
         self.trajectory: Floats = np.empty((0, 3))
+        #: Ground under the views of a 3-D map, shape (k, 6): a place [m, map], and the unit normal
+        #: of the ground there, which points up.
+        self.planes: Floats = np.empty((0, 6))
 
     @property
     def ndim(self) -> int:
@@ -265,6 +269,7 @@ class ConfidenceGrid:
             self.rule.merge(ours.confidence, ours.count, theirs.confidence, theirs.count)
         merged._layers.merge(other._layers, self.rule)
         merged.trajectory = np.concatenate([self.trajectory, other.trajectory])
+        merged.planes = np.concatenate([self.planes, other.planes])
         return merged
 
     def copy(self) -> ConfidenceGrid:
@@ -272,8 +277,62 @@ class ConfidenceGrid:
         twin = ConfidenceGrid(**self._settings())
         twin._tiles.copy_from(self._tiles)
         twin._layers.copy_from(self._layers)
-        twin.trajectory = self.trajectory.copy()
+        twin.trajectory, twin.planes = self.trajectory.copy(), self.planes.copy()
         return twin
+
+    def collapse(
+        self,
+        *,
+        low: float = 0.15,
+        high: float = 2.0,
+        free_below: float = 0.5,
+        doubtful: float = 0.25,
+    ) -> ConfidenceGrid:
+        """Return the 2-D map of a band of heights above the local ground of a 3-D map.
+
+        A cell is non-free if a voxel of its column in the band is. It is free only if a voxel low
+        in the band is: free space above a box says nothing about what the robot drives into. A 2-D
+        map is returned as a copy.
+
+        Parameters
+        ----------
+        low, high : float, default 0.15, 2.0 [m]
+            Band of heights above the ground in which the centres of voxels count: what is lower
+            can be driven over, what is higher is passed below.
+        free_below : float, default 0.5 [m]
+            A cell is free if a voxel between `low` and this height is.
+
+        doubtful : float, default 0.25
+            A non-free voxel whose evidence adds up to no more than this does not block a column
+            that is free below it. A column has many voxels, and what one view alone said of one
+            from afar is refuted by none.
+
+        Raises
+        ------
+        InputError
+            Heights that do not ascend, a band without a voxel that was seen, or a map without
+            ground planes.
+        """
+        band = as_band(low, high, free_below, doubtful)
+        if self.ndim == 2:
+            return self.copy()
+        if len(self.planes) == 0:
+            raise InputError(
+                "map",
+                "ground planes of its views",
+                "none",
+                hint="Map views with ground planes, as from groundmap.fit_ground, or set "
+                "`grid.planes`.",
+            )
+        settings = self._settings() | {"origin": self.origin[:2], "heights": SIGHT_HEIGHTS}
+        flat = ConfidenceGrid(**settings)
+        planes = as_planes(self.planes)
+        for lower, confidence, count in collapse_tiles(
+            self._tiles, planes, self.origin, self.resolution, band
+        ):
+            flat._tiles.write(lower, confidence, count)
+        flat.trajectory = self.trajectory.copy()
+        return flat
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the grid to a file without loss; an existing file is replaced at the end.
@@ -283,7 +342,9 @@ class ConfidenceGrid:
         OSError
             The folder does not exist or is not writable.
         """
-        content = GridContent(self._settings(), self._tiles, self._layers, self.trajectory)
+        content = GridContent(
+            self._settings(), self._tiles, self._layers, self.trajectory, self.planes
+        )
         write_grid(path, content)
 
     @classmethod
@@ -298,7 +359,7 @@ class ConfidenceGrid:
         content = read_grid(path)
         grid = cls(**content.settings)
         grid._tiles, grid._layers = content.tiles, content.layers
-        grid.trajectory = content.trajectory
+        grid.trajectory, grid.planes = content.trajectory, content.planes
         return grid
 
     def _settings(self) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from groundmap.arrays import Floats, as_floats, check_finite
 from groundmap.errors import FileFormatError
 from groundmap.files.archive import read_archive, write_archive
 from groundmap.grid.arguments import as_origin, as_resolution, check_frame
+from groundmap.grid.collapse import as_planes
 from groundmap.grid.fusion import rule_from
 from groundmap.grid.height_layers import HeightLayers
 from groundmap.grid.old_versions import upgrade
@@ -24,6 +25,7 @@ class GridContent(NamedTuple):
     tiles: Tiles
     layers: HeightLayers
     trajectory: Floats  #: shape (n, 3): x, y [m], yaw [rad], in the map frame
+    planes: Floats  #: shape (k, 6), see `groundmap.ConfidenceGrid.planes`
 
 
 def write_grid(path: str | PathLike[str], content: GridContent) -> None:
@@ -51,6 +53,7 @@ def write_grid(path: str | PathLike[str], content: GridContent) -> None:
         **content.tiles.to_arrays(),
         **content.layers.to_arrays(),
         "trajectory": content.trajectory,
+        "planes": content.planes,
     }
     write_archive(path, header, arrays)
 
@@ -76,6 +79,7 @@ def read_grid(path: str | PathLike[str]) -> GridContent:
         layers = HeightLayers.from_arrays(ndim, settings["heights"], arrays)
         trajectory = as_floats("trajectory", arrays["trajectory"], (None, 3))
         check_finite("trajectory", trajectory)
+        planes = as_planes(arrays.get("planes", ()))  # older files have none
     except (KeyError, TypeError, ValueError) as error:
         raise FileFormatError(path, "a complete map file", f"{error}") from error
-    return GridContent(settings, tiles, layers, trajectory)
+    return GridContent(settings, tiles, layers, trajectory, planes)

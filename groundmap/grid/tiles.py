@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from groundmap.arrays import FARTHEST_CELL, Bools, Counts, Floats32, Ints
 from groundmap.errors import InputError
+from groundmap.grid.kernels.fuse import parts_with_evidence
 
 TILE_SHAPES = {2: (64, 64), 3: (16, 16, 16)}
 LAYERS = {"confidence": np.float32, "count": np.uint32}
@@ -94,15 +95,48 @@ class Tiles:
             Cell of the block's first entry.
         block : ndarray of float32
         """
-        upper = lower + block.shape
-        first, last = lower // self.shape, (upper - 1) // self.shape
-        for offset in np.ndindex(*(last - first + 1).tolist()):
-            index = first + offset
-            here, there = self._overlap(index, lower, upper)
-            if block[there].any():
-                part = np.zeros(self.shape, dtype=np.float32)
-                part[here] = block[there]
-                yield self.touch(tuple(index.tolist())), part
+        if block.size == 0:
+            return
+        shape = np.array(self.shape)
+        first, offset = lower // shape, lower % shape
+        parts = -(-(offset + block.shape) // shape)
+        some = np.zeros(parts, dtype=np.bool_)
+        # Two dimensions are one layer of three.
+        layers = (1,) * (3 - block.ndim)
+        parts_with_evidence(
+            block.reshape(layers + block.shape),
+            np.concatenate([np.zeros(len(layers), dtype=np.int64), offset]),
+            np.concatenate([np.ones(len(layers), dtype=np.int64), shape]),
+            some.reshape(layers + some.shape),
+        )
+        corner = (first * shape - lower).tolist()
+        for index in np.argwhere(some).tolist():
+            start = [c + i * side for c, i, side in zip(corner, index, self.shape, strict=True)]
+            there = tuple(
+                slice(max(a, 0), a + side) for a, side in zip(start, self.shape, strict=True)
+            )
+            inside = block[there]
+            part = np.zeros(self.shape, dtype=np.float32)
+            part[
+                tuple(
+                    slice(max(-a, 0), max(-a, 0) + length)
+                    for a, length in zip(start, inside.shape, strict=True)
+                )
+            ] = inside
+            yield self.touch(tuple(f + i for f, i in zip(first.tolist(), index, strict=True))), part
+
+    def write(self, lower: Ints, confidence: Floats32, count: Counts) -> None:
+        """Write a block of cells that lies within one tile.
+
+        Parameters
+        ----------
+        lower : ndarray, shape (d,)
+            Cell of the block's first entry.
+        confidence, count : ndarray
+        """
+        tile = self.touch(tuple((lower // self.shape).tolist()))
+        here = tuple(map(slice, lower % self.shape, lower % self.shape + confidence.shape))
+        tile.confidence[here], tile.count[here] = confidence, count
 
     def read(self, lower: Ints, upper: Ints) -> Tile:
         """Return the cells of a box as dense arrays; zeros where no tile exists.

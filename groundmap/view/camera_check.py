@@ -31,6 +31,26 @@ def check_camera(view: View, *, number: int | None = None) -> None:
         The optical axis is more than 60 degrees off the horizontal, or up of the base more than 45
         degrees off z of the map.
     """
+    check_position(view, number=number)
+    fault = camera_fault(view.T_map_base, view.rig)
+    if fault:
+        raise NoGroundPlaneError(f"{name_of(view, number)}: {fault}")
+
+
+def check_position(view: View, *, number: int | None = None) -> None:
+    """Check that a view is not too far from the origin of the map.
+
+    Parameters
+    ----------
+    view : View
+    number : int, optional
+        Index of the view in its log, for error messages.
+
+    Raises
+    ------
+    InputError
+        The pose is more than 1e8 m from the origin.
+    """
     farthest = float(np.abs(view.T_map_base[:3, 3]).max())
     if farthest > FARTHEST:
         raise InputError(
@@ -39,9 +59,6 @@ def check_camera(view: View, *, number: int | None = None) -> None:
             f"{farthest:g} m",
             where=name_of(view, number),
         )
-    fault = camera_fault(view.T_map_base, view.rig)
-    if fault:
-        raise NoGroundPlaneError(f"{name_of(view, number)}: {fault}")
 
 
 def camera_fault(T_map_base: Floats, rig: StereoRig) -> str:

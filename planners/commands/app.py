@@ -13,6 +13,7 @@ from typer.exceptions import TyperException
 from groundmap.errors import GroundmapError
 from groundmap.printable import printable
 from planners.commands.bench import bench_app
+from planners.commands.collapse import collapse_command
 from planners.commands.console import print_message
 from planners.commands.convert import convert_command
 from planners.commands.demo import demo_command
@@ -57,6 +58,7 @@ app.command("map")(map_command)
 app.command("plan")(plan_command)
 app.command("plot")(plot_command)
 app.command("info")(info_command)
+app.command("collapse")(collapse_command)
 app.command("convert")(convert_command)
 app.command("evaluate")(evaluate_command)
 app.add_typer(scenario_app)

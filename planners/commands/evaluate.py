@@ -11,7 +11,7 @@ import typer
 from groundmap import draw, read_views
 from groundmap.evaluate.protocols import Verdict, evaluate
 from planners.commands.console import JsonOption, emit, emit_columns, show_progress
-from planners.commands.settings_file import ConfigOption, read_settings
+from planners.commands.settings_file import ConfigOption, ModeOption, read_settings
 
 
 def evaluate_command(
@@ -23,6 +23,7 @@ def evaluate_command(
     plot: Annotated[
         Path | None, typer.Option(help="Draw the map and the held-out features: .png, .pdf, .svg.")
     ] = None,
+    mode: ModeOption = None,
     camera_height: Annotated[
         float | None,
         typer.Option(help="Height of the camera above level ground [m]; default: fitted."),
@@ -30,7 +31,10 @@ def evaluate_command(
     config: ConfigOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Judge maps of a log by features held out of them; figures are shares from 0 to 1."""
+    """Judge maps of a log by features held out of them; figures are shares from 0 to 1.
+
+    A 3-D map is judged by its collapse to 2-D.
+    """
     if plot is not None:
         draw.check_picture(plot)
     log = read_views(source, poses=poses)
@@ -44,7 +48,7 @@ def evaluate_command(
         watch=watch,
         ground=settings["ground"],
         camera_height=camera_height,
-        **settings["mapper"],
+        **settings["mapper"] | ({} if mode is None else {"mode": mode}),
     )
     if plot is not None:
         _draw(verdicts["views"], plot)

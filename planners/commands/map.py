@@ -22,7 +22,7 @@ from planners.commands.console import (
     seconds_since_start,
     show_progress,
 )
-from planners.commands.settings_file import ConfigOption, read_settings
+from planners.commands.settings_file import ConfigOption, ModeOption, read_settings
 from planners.commands.sources import (
     CameraHeightOption,
     FormatOption,
@@ -53,13 +53,14 @@ def map_command(
     level: LevelOption = None,
     point_noise: PointNoiseOption = None,
     guess_visibility: GuessOption = False,
+    mode: ModeOption = None,
     resolution: Annotated[
         float | None, typer.Option(help="Side of a cell [m]; default: 0.1524 m.")
     ] = None,
     uncertainty: Annotated[
         str | None,
         typer.Option(
-            help="Uncertainty of surfaces: ellipsoid, radius or none; default: ellipsoid."
+            help="Uncertainty of surfaces: ellipsoid, gaussian, radius or none; default: ellipsoid."
         ),
     ] = None,
     fusion: Annotated[
@@ -77,6 +78,7 @@ def map_command(
     check_writable(out)
     tables = read_settings(config)
     given = {
+        "mode": mode,
         "resolution": resolution,
         "uncertainty": uncertainty,
         "fusion": fusion,
@@ -165,7 +167,7 @@ def _summary(
     mapper: GroundMapper, jumps: list[Jump], stopwatch: Stopwatch, out: Path
 ) -> dict[str, Any]:
     grid, stats = mapper.grid, mapper.stats
-    area = {state: grid.area(state) for state in (CellState.FREE, CellState.NONFREE)}
+    extent, unit = ("area", "m2") if grid.ndim == 2 else ("volume", "m3")
     seconds = stopwatch.stop()
     mapping = sum(time for stage, time in seconds.items() if stage not in NOT_MAPPING)
     return {
@@ -176,8 +178,8 @@ def _summary(
         "seen_through": stats.seen_through,
         "through_viewpoint": stats.through_viewpoint,
         "pose_jumps": [jump._asdict() for jump in jumps],
-        "area_free_m2": area[CellState.FREE],
-        "area_nonfree_m2": area[CellState.NONFREE],
+        f"{extent}_free_{unit}": grid.area(CellState.FREE),
+        f"{extent}_nonfree_{unit}": grid.area(CellState.NONFREE),
         "resolution": grid.resolution,
         "first_pose": grid.trajectory[0].tolist(),
         "last_pose": grid.trajectory[-1].tolist(),

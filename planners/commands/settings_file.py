@@ -18,6 +18,11 @@ ConfigOption = Annotated[
     typer.Option(help="TOML file with all other settings, in tables [mapper] and [ground]."),
 ]
 
+ModeOption = Annotated[
+    str | None,
+    typer.Option(help="Kind of map: 2d (cells of the ground) or 3d (voxels); default: 2d."),
+]
+
 
 def read_settings(path: Path | None) -> dict[str, dict[str, Any]]:
     """Return the validated tables of a settings file; without a file, empty tables.

@@ -183,6 +183,8 @@ got (0, nan).
         """
         if self.grid.ndim != dimensions:
             expected, got = f"a {dimensions}-D map", f"a {self.grid.ndim}-D map"
+            if dimensions == 2 and not hint:
+                hint = "Plan on `grid.collapse()`, the map of a band of heights."
             raise ProblemError("grid", expected, got, hint=hint)
 
 

@@ -18,21 +18,23 @@ from groundmap.evidence.evidence import Evidence
 from groundmap.evidence.ground_plane.height_classes import GroundView
 from groundmap.evidence.ground_plane.rasterised import evidence_of
 from groundmap.evidence.ground_plane.surfaces import SurfaceKind, find_surfaces
+from groundmap.evidence.ground_plane.view_parts import ViewParts
 from groundmap.evidence.ground_plane.visibility import visible_freespace
 from groundmap.evidence.triangulation import triangulate
 from groundmap.grid.grid import ConfidenceGrid
-from groundmap.mapper import ViewParts
 from groundmap.settings import MapperSettings
 from oracles import Cell, cell_boxes, in_map, said, shifted, turned
 from strategies import flat_view, rngs, views
 
 RESOLUTION = 0.125
-MODELS = ["ellipsoid", "radius", "none"]
+MODELS = ["ellipsoid", "radius", "none"]  # of constant density
 SLACK = 1e-9  # [m], what rounding may add to a cell
 
 
 def explained(view: View, **options: Any) -> ViewParts:
-    return GroundMapper(**{"resolution": RESOLUTION, **options}).explain(view)
+    parts = GroundMapper(**{"resolution": RESOLUTION, **options}).explain(view)
+    assert isinstance(parts, ViewParts)
+    return parts
 
 
 def by_hand(ground_view: GroundView, **options: Any) -> ViewParts:

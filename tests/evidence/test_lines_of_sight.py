@@ -427,9 +427,9 @@ def test_at_an_images_border_a_ground_feature_vouches_inwards_only() -> None:
 
 
 @settings(max_examples=100)
-@given(rngs(), st.sampled_from(["ellipsoid", "radius", "none"]))
+@given(rngs(), st.sampled_from(["ellipsoid", "gaussian", "radius", "none"]))
 def test_lines_to_low_obstacles_count_as_far_as_surely_before_them(
-    rng: np.random.Generator, model: Literal["ellipsoid", "radius", "none"]
+    rng: np.random.Generator, model: Literal["ellipsoid", "gaussian", "radius", "none"]
 ) -> None:
     options = MapperSettings(uncertainty=model, support_angle=1e-9)
     points = rng.uniform((0.4, -4.0), (9.0, 4.0), size=(12, 2))

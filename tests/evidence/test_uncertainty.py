@@ -9,10 +9,11 @@ from hypothesis import given, settings
 from scipy import ndimage
 
 import groundmap
-from groundmap import GroundMapper, View
+from groundmap import GroundMapper, GroundPlane, StereoRig, View
 from groundmap.arrays import Bools, Floats
 from groundmap.evidence.uncertainty import MODELS, Ellipsoid, Exact, Radius
 from groundmap.grid.window import CellState
+from groundmap.view.frames import map_from_world
 from strategies import pixels_of, pose, rig, rngs
 
 DIRECTIONS = np.linspace(0.0, np.pi, 20001)
@@ -35,7 +36,7 @@ def edges(rng: np.random.Generator, count: int) -> Floats:
 
 
 def test_models_go_by_their_names() -> None:
-    assert set(MODELS) == {"ellipsoid", "radius", "none"}
+    assert set(MODELS) == {"ellipsoid", "gaussian", "radius", "none"}
     assert all(model.name == name for name, model in MODELS.items())
 
 
@@ -224,3 +225,31 @@ def joins_front_and_back(free: Bools) -> bool:
     label, _ = ndimage.label(free)
     front, back = set(label[:, 0].tolist()), set(label[:, -1].tolist())
     return bool((front & back) - {0})
+
+
+def test_a_gaussian_falls_off_from_the_surface_and_sums_to_one_cell() -> None:
+    model, resolution = MODELS["gaussian"], 0.01
+    reach = np.array([[0.4, 0.4]])
+    _, around = model.evidence(reach, resolution)
+    assert (np.diff(model.falloff) < 0).all()
+    cells_per_shell = 0.4 / resolution / len(model.falloff)
+    along_ray = 2.0 * around[0] * model.falloff.sum() * cells_per_shell
+    assert along_ray == pytest.approx(1.0)
+    sigmas = 2.0 * (np.arange(4) + 0.5) / 4
+    ratios = model.falloff / np.exp(-0.5 * sigmas**2)
+    np.testing.assert_allclose(ratios, ratios[0])
+
+
+def test_a_wall_is_nonfree_in_gaussian_steps_on_a_2d_map() -> None:
+    ends = [[(420.0, 414.0, 240.0), (220.0, 214.0, 240.0)]]
+    rig = StereoRig(fx=700.0, fy=700.0, cx=320.0, cy=240.0, baseline=0.1)
+    view = View.from_pixels(map_from_world(np.eye(4), "optical"), rig, segments_px=ends)
+    view = view.with_plane(GroundPlane.below_camera(rig, 1.0))
+    used = GroundMapper(uncertainty="gaussian", resolution=0.05)
+    used.integrate(view)
+    depth, sigma = 70.0 / 6.0, (70.0 / 6.0) ** 2 * 0.5 * np.sqrt(2.0) / 70.0
+    for side in (-1.0, 1.0):
+        x = depth + side * sigma * np.array([0.25, 0.75, 1.25, 1.75])
+        z = np.asarray(used.grid.confidence_at(np.column_stack([x, np.zeros(4)])))
+        np.testing.assert_allclose(z / z[0], MODELS["gaussian"].falloff, rtol=1e-5)
+    assert used.grid.confidence_at((depth, 0.0)) > z[0]

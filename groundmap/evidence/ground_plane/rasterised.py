@@ -107,18 +107,20 @@ def evidence_of(
         z *= np.clip(surest, LEAST_SURE, 1.0, dtype=np.float32)
     for wheel in wheels - lower:
         roll_over(z, height, wheel, half_width)
-    draw_surfaces(
-        z,
-        height,
-        ends[drawn] - lower,
-        cores[drawn] - lower,
-        outlines[drawn] - lower,
-        caps[drawn],
-        discs[drawn],
-        (on_surface * belief)[drawn],
-        (around * belief)[drawn],
-        surfaces.tops.max(axis=1)[drawn],
-    )
+    for shell, share in enumerate(model.falloff, start=1):
+        reach = surfaces.reach * (shell / len(model.falloff))
+        draw_surfaces(
+            z,
+            height,
+            ends[drawn] - lower,
+            cores[drawn] - lower,
+            to_cells(model.outline(surfaces.cores, reach))[drawn] - lower,
+            model.caps(reach)[drawn] / grid.resolution,
+            discs[drawn],
+            (on_surface * belief)[drawn],
+            (share * around * belief)[drawn],
+            surfaces.tops.max(axis=1)[drawn],
+        )
     evidence = Evidence(lower[::-1].astype(np.int64), z, height)
     return with_drop_offs(evidence, ground_view, grid)
 

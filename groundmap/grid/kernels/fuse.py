@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from groundmap.arrays import Counts, Floats32
+from groundmap.arrays import Bools, Counts, Floats, Floats32, Ints
 
 MOST = np.uint32(0xFFFFFFFF)
 
@@ -66,3 +66,41 @@ def keep_low(z: Floats32, height: Floats32, sight: float, top: float, low: Float
     for i in range(z.size):
         if z[i] != 0.0 and height[i] < (sight if z[i] < 0.0 else top):
             low[i] = z[i]
+
+
+@njit(cache=True, nogil=True)
+def beyond_one(z: Floats | Floats32) -> bool:
+    """Whether any of the numbers, shape (n,), is NaN or beyond [-1, 1]."""
+    beyond = 0
+    for i in range(z.size):
+        beyond += not abs(z[i]) <= 1.0
+    return beyond > 0
+
+
+@njit(cache=True, nogil=True)
+def parts_with_evidence(z: Floats32, offset: Ints, side: Ints, some: Bools) -> None:
+    """Tell which parts of a block, cut at multiples of `side`, hold a number that is not 0.
+
+    Parameters
+    ----------
+    z : ndarray of float32, shape (layers, rows, cols)
+    offset : ndarray, shape (3,)
+        Of the block's first cell from the border of the part that it lies in.
+    side : ndarray, shape (3,)
+        Cells along each axis of a part.
+    some : ndarray of bool, shape of the parts
+        Is set to true where there is one.
+    """
+    for i in range(z.shape[0]):
+        for j in range(z.shape[1]):
+            a, b = (i + offset[0]) // side[0], (j + offset[1]) // side[1]
+            k = 0
+            for part in range(some.shape[2]):
+                end = min((part + 1) * side[2] - offset[2], z.shape[2])
+                if not some[a, b, part]:
+                    while k < end:
+                        if z[i, j, k] != 0.0:
+                            some[a, b, part] = True
+                            break
+                        k += 1
+                k = end

@@ -1,0 +1,1 @@
+"""Compiled loops of the builder of 3-D maps."""
