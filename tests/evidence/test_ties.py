@@ -38,7 +38,10 @@ def explained(xyz: Floats) -> ViewParts:
     spread = variance[:, None, None] * rays[:, :, None] * rays[:, None, :]
     points = Features.points(xyz, 1e-4 * np.eye(3) + spread)
     view = View(T_map_base=map_from_world(np.eye(4), "optical"), rig=RIG, points=points)
-    return GroundMapper().explain(view.with_plane(GroundPlane.below_camera(RIG, CAMERA)))
+    parts: ViewParts = GroundMapper().explain(
+        view.with_plane(GroundPlane.below_camera(RIG, CAMERA))
+    )
+    return parts
 
 
 @pytest.mark.parametrize("whole_disparities", [False, True])
