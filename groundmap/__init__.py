@@ -1,10 +1,12 @@
 """Confidence grids for path planning, from sparse stereo features."""
 
-from groundmap.errors import GroundmapError
+from groundmap.errors import GroundmapError, RegistrationError
 from groundmap.grid.grid import ConfidenceGrid
 from groundmap.grid.window import CellState, GridWindow
 from groundmap.io import load_map, read_views, write_views
 from groundmap.mapper import GroundMapper
+from groundmap.registration.register import Registration, register
+from groundmap.registration.settings import RegistrationSettings
 from groundmap.settings import GroundSettings, MapperSettings
 from groundmap.view.ground_fit import fit_ground
 from groundmap.view.ground_plane import GroundPlane
@@ -22,11 +24,15 @@ __all__ = [
     "GroundSettings",
     "GroundmapError",
     "MapperSettings",
+    "Registration",
+    "RegistrationError",
+    "RegistrationSettings",
     "StereoRig",
     "View",
     "fit_ground",
     "load_map",
     "pose_jumps",
     "read_views",
+    "register",
     "write_views",
 ]
