@@ -16,6 +16,7 @@ SAME = 0.5  # share of common matches from which two alignments are the same mot
 PROMISING = 0.4  # share of the best support
 POOLS = (200, 400)  # best features that triangles are made of, one after the other
 ENOUGH = 3  # triangles of the best motion that were found; those of a better would be more
+STRONG = 5.0  # multiple of the support by chance that is enough at the end of a search
 ABOVE_CHANCE = 2.0  # least support, as a multiple of that by chance
 AXES = ("right", "down", "forward")
 
@@ -63,8 +64,8 @@ def find_motion(
             f"two motions that are {shift:.3g} m apart explain the features alike: "
             f"{best.support} and {rival.support} of {len(a.xyz)} agree.",
         )
-    if not settled:
-        text = f"{best.support} agree, too few to rule out another motion"
+    if not settled and best.support < STRONG * chance:
+        text = f"{best.support} agree ({chance:.0f} by chance), too few to rule out another motion"
         raise _too_few(text, a, b)
     _check_determined(best, model, options)
     return best

@@ -44,5 +44,5 @@ class RegistrationSettings(Settings):
     max_sigma_rotation: float = Field(
         0.02, gt=0, le=3.15, description="the same of the rotation [rad]"
     )
-    rounds: int = Field(100, ge=1, le=10_000, description="largest number of rounds of the search")
+    rounds: int = Field(60, ge=1, le=10_000, description="largest number of rounds of the search")
     seed: int = Field(0, ge=0, description="seed of the choice of features in the search")
