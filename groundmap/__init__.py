@@ -7,6 +7,7 @@ from groundmap.io import load_map, read_views, write_views
 from groundmap.mapper import GroundMapper
 from groundmap.registration.register import Registration, register
 from groundmap.registration.settings import RegistrationSettings
+from groundmap.registration.trajectory import Trajectory, estimate_poses
 from groundmap.settings import GroundSettings, MapperSettings
 from groundmap.view.ground_fit import fit_ground
 from groundmap.view.ground_plane import GroundPlane
@@ -28,7 +29,9 @@ __all__ = [
     "RegistrationError",
     "RegistrationSettings",
     "StereoRig",
+    "Trajectory",
     "View",
+    "estimate_poses",
     "fit_ground",
     "load_map",
     "pose_jumps",
