@@ -14,7 +14,7 @@ from groundmap import View, estimate_poses, write_views
 from groundmap.arrays import Floats
 from groundmap.errors import InputError, RegistrationError
 from groundmap.registration.pose_graph import Edge, solve_pose_graph
-from groundmap.view.frames import invert
+from groundmap.view.frames import T_REP103_OPTICAL, invert
 from registration.scenes import seen_from, street, transform
 
 STEPS = [transform((0.02 * k, 0.0, 0.7 * k), (0.0, 0.01 * k, 0.0)) for k in range(6)]
@@ -137,7 +137,7 @@ def test_the_command_maps_with_estimated_poses(
     tmp_path: Path,
 ) -> None:
     views = drive()
-    write_views([replace(view, T_map_base=np.eye(4)) for view in views], tmp_path / "log")
+    write_views([replace(view, T_map_base=T_REP103_OPTICAL) for view in views], tmp_path / "log")
     out = tmp_path / "map.npz"
     result = run(
         "map",

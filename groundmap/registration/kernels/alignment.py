@@ -213,6 +213,7 @@ def match_features(
         own[1, 1] += gate * gate
         own[2, 2] += gate * gate * bearing[2] * bearing[2]
         middle = _bin(bearing[1], size) * side + _bin(bearing[0], size)
+        best, least = -1, np.inf
         for line in range(middle - side, middle + side + 1, side):
             for at in range(start[line - 1], start[line + 2]):
                 j = rows[at]
@@ -221,13 +222,15 @@ def match_features(
                 for k in range(3):
                     difference[k] = bearing[k] - bearings_b[j, k]
                 off = _distance(difference, own, covariance_b[j], most, work[0], inverse)
-                if off > most or off >= distance[i]:
+                if off > most or off >= least or (taken[j] >= 0 and distance[taken[j]] <= off):
                     continue
-                if taken[j] >= 0 and distance[taken[j]] <= off:
-                    continue
-                _assign(i, j, off, partner, taken, distance)
+                best, least = j, off
                 residuals[i] = difference
                 information[i] = inverse
+        if best >= 0:
+            if taken[best] >= 0:  # the feature that was matched to it loses its match
+                partner[taken[best]] = -1
+            partner[i], taken[best], distance[i] = best, i, least
     return int((partner >= 0).sum())
 
 
@@ -262,19 +265,6 @@ def _distance(
             work[k, m] = one[k, m] + other[k, m]
     _invert(work, inverse)
     return _square(difference, inverse)
-
-
-@njit(cache=True, nogil=True)
-def _assign(i: int, j: int, off: float, partner: Ints, taken: Ints, distance: Floats) -> None:
-    """Match two features; whoever was matched to one of them loses the match."""
-    if partner[i] >= 0:
-        taken[partner[i]] = -1
-    if taken[j] >= 0:
-        partner[taken[j]] = -1
-        distance[taken[j]] = np.inf
-    taken[j] = i
-    partner[i] = j
-    distance[i] = off
 
 
 @njit(cache=True, nogil=True)
