@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from groundmap.arrays import Floats, Ints
+from groundmap.arrays import Floats, Ints, as_floats
+from groundmap.errors import InputError
 from groundmap.evidence.evidence import Evidence
 from groundmap.evidence.ground_plane.height_classes import GroundView, flatten
 from groundmap.evidence.ground_plane.rasterised import evidence_of
@@ -18,6 +20,7 @@ from groundmap.evidence.ground_plane.visibility import SightFan, visible_freespa
 from groundmap.evidence.triangulation import Mesh, triangulate
 from groundmap.grid.fusion import RULES
 from groundmap.grid.grid import ConfidenceGrid
+from groundmap.kept_views import KeptView, moved_views
 from groundmap.settings import MapperSettings
 from groundmap.stopwatch import Stopwatch
 from groundmap.view.frames import map_from_world
@@ -61,6 +64,8 @@ class GroundMapper:
     ----------
     stages : Stopwatch, optional
         Stopwatch for the time of each step, if it is shared with other code.
+    keep_views : bool, default False
+        Keep a reference to each view and its evidence (about 0.2 MB), for `refuse`.
     **settings
         Fields of `groundmap.MapperSettings`: ``resolution`` [m], ``fusion``, ``uncertainty``,
         ``max_range`` [m], ``step_height`` [m], ...
@@ -95,7 +100,9 @@ class GroundMapper:
     array([-0.25,  0.  ], dtype=float32)
     """
 
-    def __init__(self, *, stages: Stopwatch | None = None, **settings: Any) -> None:
+    def __init__(
+        self, *, stages: Stopwatch | None = None, keep_views: bool = False, **settings: Any
+    ) -> None:
         self.settings = MapperSettings(**settings)
         parameters = {"cap": self.settings.cap} if self.settings.fusion == "capped" else {}
         self.grid = ConfidenceGrid(
@@ -107,6 +114,7 @@ class GroundMapper:
         self.stats = MapperStats()
         self.stages = stages or Stopwatch()
         self.changed: Ints = np.empty((0, 2), dtype=np.int64)
+        self._kept: list[KeptView] | None = [] if keep_views else None
 
     def integrate(self, view: View) -> None:
         """Add the evidence of one view to the grid; a refused view does not change the grid.
@@ -129,11 +137,64 @@ class GroundMapper:
             self.grid.fuse(*parts.evidence)
             self.changed = parts.evidence.cells()
             self.grid.trajectory = np.concatenate([self.grid.trajectory, _pose2d(view)])
+        if self._kept is not None:
+            self._kept.append(KeptView.of(view, parts.evidence))
         self.stats.views += 1
         self.stats.features_used += parts.ground_view.used
         self.stats.features_dropped.update(parts.ground_view.dropped)
         self.stats.seen_through += parts.fan.contradictions.features
         self.stats.through_viewpoint += parts.surfaces.through_viewpoint
+
+    def refuse(
+        self, poses: npt.ArrayLike, *, tolerance: float = 0.0, turn_tolerance: float = 0.0
+    ) -> int:
+        """Correct the poses of all views after the fact, as when a loop was closed.
+
+        The map is the same as one of all views with the new poses. Only tiles that views with
+        another pose touch, before or after, are built anew. `stats` are not changed.
+
+        Parameters
+        ----------
+        poses : array_like, shape (n, 4, 4) [m, map]
+            `View.T_map_base` of all integrated views, in their order.
+        tolerance : float, default 0 [m]
+            Views that moved by no more stay as they are mapped,
+        turn_tolerance : float, default 0 [rad]
+            if they turned by no more than this, too.
+
+        Returns
+        -------
+        int
+            Number of views with another pose.
+
+        Raises
+        ------
+        InputError
+            The mapper does not keep views, or there is not one pose for each.
+        CameraError
+            A pose is not a rigid transform.
+        NoGroundPlaneError
+            With its new pose, a camera looks at the ground or the sky. The map is not changed.
+        """
+        if self._kept is None:
+            hint = "Give keep_views=True to the mapper."
+            raise InputError("refuse", "a mapper that keeps its views", "another", hint=hint)
+        new = as_floats("poses", poses, (len(self._kept), 4, 4))
+        moved = moved_views(self._kept, new, tolerance, turn_tolerance)
+        kept = list(self._kept)
+        touched = [self.changed[:0]]
+        for number in moved:
+            view = replace(kept[number].view, T_map_base=new[number])
+            again = KeptView.of(view, self.explain(view).evidence)
+            touched += [kept[number].cells(), again.cells()]
+            kept[number] = again
+        self.changed = np.unique(np.concatenate(touched), axis=0)
+        with self.stages.measure("fuse"):
+            self.grid.rebuild(self.changed, (one.evidence() for one in kept))
+        self._kept = kept
+        if moved:
+            self.grid.trajectory = np.concatenate([_pose2d(one.view) for one in kept])
+        return len(moved)
 
     def explain(self, view: View) -> ViewParts:
         """Return the evidence of one view with all intermediate results, without fusing it.

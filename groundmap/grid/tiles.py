@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -83,7 +83,17 @@ class Tiles:
             return nowhere, nowhere
         return indices.min(axis=0) * self.shape, (indices.max(axis=0) + 1) * self.shape
 
-    def cut(self, lower: Ints, block: Floats32) -> Iterator[tuple[Tile, Floats32]]:
+    def drop(self, index: Index) -> None:
+        """Remove a tile, if it exists."""
+        self._held.pop(index, None)
+
+    def indices_of(self, cells: Ints) -> set[Index]:
+        """Return the indices of the tiles of cells, shape (n, d)."""
+        return {tuple(index) for index in np.unique(cells // self.shape, axis=0).tolist()}
+
+    def cut(
+        self, lower: Ints, block: Floats32, only: Container[Index] | None = None
+    ) -> Iterator[tuple[Tile, Floats32]]:
         """Split a block of cells by tile: yield each tile and its part, padded with zeros.
 
         Parts without values other than zero are skipped, and their tiles are not allocated.
@@ -93,12 +103,16 @@ class Tiles:
         lower : ndarray of int, shape (d,)
             Cell of the block's first entry.
         block : ndarray of float32
+        only : container of tuple of int, optional
+            Indices of the tiles to yield; default: all.
         """
         upper = lower + block.shape
         first, last = lower // self.shape, (upper - 1) // self.shape
         for offset in np.ndindex(*(last - first + 1).tolist()):
             index = first + offset
             here, there = self._overlap(index, lower, upper)
+            if only is not None and tuple(index.tolist()) not in only:
+                continue
             if block[there].any():
                 part = np.zeros(self.shape, dtype=np.float32)
                 part[here] = block[there]

@@ -21,7 +21,7 @@ from groundmap import (
 from groundmap.arrays import Floats
 from groundmap.errors import CameraError, SettingsError
 from groundmap.view.frames import invert
-from registration.scenes import RIG, seen_from, street, transform
+from registration_scenes import RIG, seen_from, street, transform
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 MOTION = transform((0.1, -0.05, 0.9), (0.01, 0.05, -0.02))

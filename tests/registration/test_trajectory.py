@@ -15,7 +15,7 @@ from groundmap.arrays import Floats
 from groundmap.errors import InputError, RegistrationError
 from groundmap.registration.pose_graph import Edge, solve_pose_graph
 from groundmap.view.frames import T_REP103_OPTICAL, invert
-from registration.scenes import seen_from, street, transform
+from registration_scenes import seen_from, street, transform
 
 STEPS = [transform((0.02 * k, 0.0, 0.7 * k), (0.0, 0.01 * k, 0.0)) for k in range(6)]
 

@@ -80,11 +80,13 @@ def score_poses(
     ----------
     poses : ndarray, shape (h, 3, 4)
     points_a : ndarray, shape (n, 3) [m]
-    noise_a, noise_b : ndarray, shape (n,) and (m,)
+    noise_a : ndarray, shape (n,)
         Standard deviation of the inverse depth [1/m].
-    labels_a, labels_b : ndarray, shape (n,) and (m,)
+    labels_a : ndarray, shape (n,)
         Only features with equal labels meet.
     bearings_b : ndarray, shape (m, 3)
+    noise_b : ndarray, shape (m,)
+    labels_b : ndarray, shape (m,)
     start, rows : ndarray
         From `fill_bins`.
     size : float
@@ -174,11 +176,12 @@ def match_features(
     pose : ndarray, shape (3, 4)
     points_a : ndarray, shape (n, 3) [m]
     covariance_a : ndarray, shape (n, 3, 3) [m²]
-    labels_a, labels_b : ndarray, shape (n,) and (m,)
+    labels_a : ndarray, shape (n,)
         Only features with equal labels match.
     bearings_b : ndarray, shape (m, 3)
     covariance_b : ndarray, shape (m, 3, 3)
         Of the bearings and inverse depths.
+    labels_b : ndarray, shape (m,)
     start, rows : ndarray
         From `fill_bins`.
     size : float

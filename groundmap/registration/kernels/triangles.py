@@ -74,9 +74,11 @@ def match_triangles(
     ----------
     triangles : ndarray, shape (k, 3)
         Rows of `points_a`.
-    points_a, points_b : ndarray, shape (n, 3) and (m, 3) [m, camera]
-        `points_b` in the order of x.
-    covariance_a, covariance_b : ndarray, shape (n, 3, 3) and (m, 3, 3) [m²]
+    points_a : ndarray, shape (n, 3) [m, camera]
+    covariance_a : ndarray, shape (n, 3, 3) [m²]
+    points_b : ndarray, shape (m, 3) [m, camera]
+        In the order of x.
+    covariance_b : ndarray, shape (m, 3, 3) [m²]
     spread_b : ndarray, shape (m,) [m]
         Bound of the standard deviation in any direction.
     labels_a, labels_b : ndarray, shape (n,) and (m,)
