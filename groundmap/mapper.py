@@ -17,10 +17,10 @@ from groundmap.evidence.ground_plane.rasterised import evidence_of
 from groundmap.evidence.ground_plane.ray_smoothing import smooth_features
 from groundmap.evidence.ground_plane.surfaces import Surfaces, find_surfaces
 from groundmap.evidence.ground_plane.visibility import SightFan, visible_freespace
+from groundmap.evidence.kept_views import KeptView, moved_views, unique_cells
 from groundmap.evidence.triangulation import Mesh, triangulate
 from groundmap.grid.fusion import RULES
 from groundmap.grid.grid import ConfidenceGrid
-from groundmap.kept_views import KeptView, moved_views
 from groundmap.settings import MapperSettings
 from groundmap.stopwatch import Stopwatch
 from groundmap.view.frames import map_from_world
@@ -188,7 +188,7 @@ class GroundMapper:
             again = KeptView.of(view, self.explain(view).evidence)
             touched += [kept[number].cells(), again.cells()]
             kept[number] = again
-        self.changed = np.unique(np.concatenate(touched), axis=0)
+        self.changed = unique_cells(np.concatenate(touched))
         with self.stages.measure("fuse"):
             self.grid.rebuild(self.changed, (one.evidence() for one in kept))
         self._kept = kept

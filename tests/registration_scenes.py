@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from groundmap import StereoRig, View
@@ -11,7 +12,7 @@ from groundmap.arrays import Floats
 RIG = StereoRig(fx=700.0, fy=700.0, cx=600.0, cy=200.0, baseline=0.5, pixel_noise_px=0.3)
 
 
-def transform(translation: tuple[float, float, float], rotation: object = (0, 0, 0)) -> Floats:
+def transform(translation: npt.ArrayLike, rotation: npt.ArrayLike = (0, 0, 0)) -> Floats:
     """Return a rigid transform from a translation [m] and a rotation vector [rad]."""
     matrix = np.eye(4)
     matrix[:3, :3] = Rotation.from_rotvec(rotation).as_matrix()

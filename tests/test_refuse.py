@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,7 +28,7 @@ def drive(count: int = 20) -> list[View]:
     return views
 
 
-def mapped(views: list[View], poses: Floats, **settings: object) -> GroundMapper:
+def mapped(views: list[View], poses: Floats, **settings: Any) -> GroundMapper:
     mapper = GroundMapper(keep_views=True, **settings)
     for view, pose in zip(views, poses, strict=True):
         mapper.integrate(replace(view, T_map_base=pose))

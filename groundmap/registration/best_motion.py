@@ -140,7 +140,7 @@ def _support(alignment: Alignment) -> int:
 def _same(one: Alignment, other: Alignment) -> bool:
     """Return whether two alignments match features in the same way."""
     common = int(((one.partner == other.partner) & (one.partner >= 0)).sum())
-    return common > SAME * min(one.count, other.count)
+    return common > SAME * min(one.matches, other.matches)
 
 
 def _check_enough(of_a: int, of_b: int, options: RegistrationSettings) -> None:
@@ -173,6 +173,6 @@ def _check_determined(best: Alignment, model: MotionModel, options: Registration
             )
             raise RegistrationError(
                 "undetermined",
-                f"the {best.count} matched features leave the {what} along ({axis}) open: its "
+                f"the {best.matches} matched features leave the {what} along ({axis}) open: its "
                 f"standard deviation is {sigma:.2g} {unit}, {limit:g} {unit} at most is allowed.",
             )

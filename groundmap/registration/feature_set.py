@@ -25,7 +25,13 @@ class FeatureSet(NamedTuple):
 
     def select(self, rows: Ints) -> FeatureSet:
         """Return the features of some rows."""
-        return FeatureSet(*(array[rows] for array in self))
+        return FeatureSet(
+            self.xyz[rows],
+            self.covariance[rows],
+            self.labels[rows],
+            self.bearings[rows],
+            self.bearing_covariance[rows],
+        )
 
     @property
     def inverse_depth_noise(self) -> Floats:

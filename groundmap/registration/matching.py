@@ -164,7 +164,8 @@ class Search:
         areas = np.linalg.norm(np.cross(xyz[:, 1] - xyz[:, 0], xyz[:, 2] - xyz[:, 0]), axis=1)
         noise = self.pool.spread[triangles].max(axis=1)
         quality = areas / np.maximum(sides, 1e-9) / (noise + self.bounds.turn * sides) ** 1.5
-        return triangles[np.argsort(-quality, kind="stable")[:BATCH]]
+        chosen: Ints = triangles[np.argsort(-quality, kind="stable")[:BATCH]]
+        return chosen
 
     def _hypotheses(self, triangles: Ints) -> tuple[Ints, Floats]:
         """Return the rows of A and B of matched triangles, shape (h, 2, 3), and their motions."""

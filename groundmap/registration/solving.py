@@ -33,7 +33,7 @@ class Alignment(NamedTuple):
     partner: Ints  #: shape (n,), row in B of each feature of A, or -1
     squares: Floats  #: shape (n,), squared Mahalanobis distances of matches
     information: Floats  #: shape (d, d), inverse covariance of the directions
-    count: int  #: number of matches
+    matches: int  #: number of features with a partner
     support: int  #: number of matches before covariances were scaled; the same for all motions
 
 
@@ -109,7 +109,7 @@ def polish(
     best = alignment
     while True:
         again = align(best.pose, a, b, bins, directions=directions, gates=WIDE_GATES)
-        if again is None or again.count <= best.count:
+        if again is None or again.matches <= best.matches:
             break
         best = again
     for _ in range(2):

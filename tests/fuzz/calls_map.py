@@ -150,7 +150,7 @@ def registration(draw: Draw, _folder: Path) -> None:
     if draw.chance(0.5):
         register(*views, guess=draw.noted("guess", array(draw, np.eye(4), 0.3)), **settings)
     else:
-        mode = draw.noted("mode", draw.pick(("estimate", "refine", "")))
+        mode: Any = draw.noted("mode", draw.pick(("estimate", "refine", "")))
         estimate_poses(views, mode=mode, **settings)
 
 

@@ -69,9 +69,9 @@ def test_each_feature_takes_the_nearest_that_none_before_is_nearer_to(seed: int)
             expected[i], taken[best] = best, free[best]
     assert (expected >= 0).sum() >= 8
     np.testing.assert_array_equal(partner, expected)
-    for i in np.flatnonzero(partner >= 0):
-        square = residuals[i] @ information[i] @ residuals[i]
-        assert square == pytest.approx(squares[i, partner[i]], rel=1e-4)
+    for row in np.flatnonzero(partner >= 0):
+        square = float(residuals[row] @ information[row] @ residuals[row])
+        assert square == pytest.approx(squares[row, partner[row]], rel=1e-4)
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -1,4 +1,4 @@
-"""Poses of a drive from its features: little drift, closed loops, and refusals that are told."""
+"""Poses of a drive from its features: little drift, closed loops, and named refusals."""
 
 from __future__ import annotations
 

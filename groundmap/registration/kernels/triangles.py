@@ -172,7 +172,8 @@ def match_triangles(
 @njit(cache=True, nogil=True)
 def _window(columns: Floats, middle: float, reach: float) -> tuple[int, int]:
     """Return the range of points whose x is within reach of a value."""
-    return np.searchsorted(columns, middle - reach), np.searchsorted(columns, middle + reach)
+    low = int(np.searchsorted(columns, middle - reach))
+    return low, int(np.searchsorted(columns, middle + reach))
 
 
 @njit(cache=True, nogil=True)
@@ -216,7 +217,7 @@ def _agrees(
         across = x * y * c[0, 1] + x * z * c[0, 2] + y * z * c[1, 2]
         along = x * x * c[0, 0] + y * y * c[1, 1] + z * z * c[2, 2]
         variance += (along + 2.0 * across) / max(square, 1e-12)
-    return abs(np.sqrt(square) - noise[0]) <= sigmas * np.sqrt(variance)
+    return bool(abs(np.sqrt(square) - noise[0]) <= sigmas * np.sqrt(variance))
 
 
 @njit(cache=True, nogil=True)

@@ -72,3 +72,14 @@ def moved_views(
     turned = 2.0 * np.arcsin(np.clip(apart / np.sqrt(8.0), 0.0, 1.0))
     stays = (shift <= tolerance) & (turned <= turn_tolerance)
     return np.flatnonzero(~stays).tolist()
+
+
+def unique_cells(cells: Ints) -> Ints:
+    """Return cells, shape (n, 2), each once, in the order of rows and columns."""
+    if not len(cells):
+        return cells
+    lower = cells.min(axis=0)
+    width = int(cells[:, 1].max() - lower[1]) + 1
+    keys = np.unique((cells[:, 0] - lower[0]) * width + (cells[:, 1] - lower[1]))
+    once: Ints = np.stack([keys // width, keys % width], axis=1) + lower
+    return once
