@@ -5,6 +5,7 @@ from groundmap.grid.grid import ConfidenceGrid
 from groundmap.grid.window import CellState, GridWindow
 from groundmap.io import load_map, read_views, write_views
 from groundmap.mapper import GroundMapper
+from groundmap.registration.places import Places, Recognition, recognise
 from groundmap.registration.register import Registration, register
 from groundmap.registration.settings import RegistrationSettings
 from groundmap.registration.trajectory import Trajectory, estimate_poses
@@ -25,6 +26,8 @@ __all__ = [
     "GroundSettings",
     "GroundmapError",
     "MapperSettings",
+    "Places",
+    "Recognition",
     "Registration",
     "RegistrationError",
     "RegistrationSettings",
@@ -36,6 +39,7 @@ __all__ = [
     "load_map",
     "pose_jumps",
     "read_views",
+    "recognise",
     "register",
     "write_views",
 ]

@@ -98,7 +98,7 @@ def register(
     matched = np.flatnonzero(best.partner >= 0)
     return Registration(
         T_a_b=T_camera_a @ invert(T_b_a) @ invert(T_camera_b),
-        covariance=_in_base(covariance_of(best, model), T_camera_b),
+        covariance=covariance_in_base(covariance_of(best, model), T_camera_b),
         inliers=np.stack([matched, best.partner[matched]], axis=1),
     )
 
@@ -132,8 +132,15 @@ def move(features: FeatureSet, transform: Floats) -> FeatureSet:
     return features._replace(xyz=xyz, covariance=covariance)
 
 
-def _in_base(covariance: Floats, T_base_camera: Floats) -> Floats:
-    """Return the covariance of a small motion in the base, from that in the camera."""
+def covariance_in_base(covariance: Floats, T_base_camera: Floats) -> Floats:
+    """Return the covariance of a small motion in the base, from that in the camera.
+
+    Parameters
+    ----------
+    covariance : ndarray, shape (6, 6)
+        Translation [m], then rotation vector [rad], in the camera.
+    T_base_camera : ndarray, shape (4, 4)
+    """
     rotation = T_base_camera[:3, :3]
     x, y, z = T_base_camera[:3, 3]
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

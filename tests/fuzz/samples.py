@@ -13,9 +13,10 @@ from PIL import Image
 
 import sparse_bag
 import sparse_scene
-from groundmap import ConfidenceGrid
+from groundmap import ConfidenceGrid, Places
 from groundmap.grid.fusion import Capped
 from planners import PlanningProblem, Roadmap
+from sample_views import few_views
 
 Files = dict[str, bytes]
 
@@ -249,6 +250,13 @@ def roadmap() -> dict[str, Any]:
     grown = Roadmap.grow(roadmap_problem(), seconds=5.0, iterations=30, seed=1, space="r2")
     with TemporaryDirectory() as folder:
         return _saved(grown, Path(folder) / "roadmap.npz")
+
+
+@cache
+def places() -> dict[str, Any]:
+    """Return the arrays of a file of places."""
+    with TemporaryDirectory() as folder:
+        return _saved(Places.of(few_views(1)), Path(folder) / "places.npz")
 
 
 def _saved(what: Any, path: Path) -> dict[str, Any]:
