@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from groundmap.arrays import Floats, Ints
-from groundmap.registration.kernels.alignment import fill_bins
+from groundmap.registration.kernels.bins import fill_bins
 from groundmap.view.view import Features
 
 BIN_SIGMAS = 6.0

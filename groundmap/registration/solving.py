@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from groundmap.arrays import Floats, Ints
 from groundmap.registration.feature_set import Bins, FeatureSet
-from groundmap.registration.kernels.alignment import match_features, normal_equations
+from groundmap.registration.kernels.alignment import match_features
+from groundmap.registration.kernels.normal_equations import normal_equations
 
 # [rad], uncertainty of bearings that is left in each step
 GATES = (0.008, 0.005, 0.003, 0.001, 0.0)

@@ -13,9 +13,9 @@ from groundmap.arrays import Floats, Ints
 from groundmap.registration.feature_set import FeatureSet, bearings_of, bins_of, feature_set
 from groundmap.registration.kernels.alignment import (
     match_features,
-    normal_equations,
     score_poses,
 )
+from groundmap.registration.kernels.normal_equations import normal_equations
 from groundmap.registration.kernels.triangles import (
     find_candidates,
     match_triangles,

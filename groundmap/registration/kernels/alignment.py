@@ -10,53 +10,9 @@ import numpy as np
 from numba import njit
 
 from groundmap.arrays import Floats, Ints
+from groundmap.registration.kernels.bins import bin_of, bins_per_side
 
 NEAREST = 1e-3  # [m], depth below which a feature is not in view
-BORDER = 2.0  # bearings beyond share the outer bins
-
-
-@njit(cache=True, nogil=True)
-def fill_bins(bearings: Floats, size: float) -> tuple[Ints, Ints]:
-    """Sort features by bins of their bearing.
-
-    Parameters
-    ----------
-    bearings : ndarray, shape (m, 3)
-        (x/z, y/z, 1/z).
-    size : float
-        Side of a bin.
-
-    Returns
-    -------
-    start : ndarray
-        The features of bin b are ``rows[start[b] : start[b + 1]]``.
-    rows : ndarray, shape (m,)
-    """
-    side = _bins(size)
-    start = np.zeros(side * side + 1, dtype=np.int64)
-    home = np.empty(len(bearings), dtype=np.int64)
-    for j in range(len(bearings)):
-        home[j] = _bin(bearings[j, 1], size) * side + _bin(bearings[j, 0], size)
-        start[home[j] + 1] += 1
-    for b in range(side * side):
-        start[b + 1] += start[b]
-    rows = np.empty(len(bearings), dtype=np.int64)
-    filled = start[:-1].copy()
-    for j in range(len(bearings)):
-        rows[filled[home[j]]] = j
-        filled[home[j]] += 1
-    return start, rows
-
-
-@njit(cache=True, nogil=True)
-def _bins(size: float) -> int:
-    return int(2.0 * BORDER / size) + 3
-
-
-@njit(cache=True, nogil=True)
-def _bin(bearing: float, size: float) -> int:
-    inside = min(max(bearing, -BORDER), BORDER)
-    return int((inside + BORDER) / size) + 1
 
 
 @njit(cache=True, nogil=True)
@@ -104,7 +60,7 @@ def score_poses(
         for i in range(len(points_a)):
             if i == third and 6 * count < best:
                 break
-            if _bearing(poses[h], points_a[i], bearing):
+            if to_bearing(poses[h], points_a[i], bearing):
                 slack = gate * bearing[2] + 2.0 * noise_a[i]
                 count += _meets(
                     bearing,
@@ -136,9 +92,9 @@ def _meets(
     gate: float,
 ) -> bool:
     """Return whether a feature of B is near a bearing and an inverse depth."""
-    side = _bins(size)
-    first, last = _bin(bearing[0] - gate, size), _bin(bearing[0] + gate, size)
-    for line in range(_bin(bearing[1] - gate, size), _bin(bearing[1] + gate, size) + 1):
+    side = bins_per_side(size)
+    first, last = bin_of(bearing[0] - gate, size), bin_of(bearing[0] + gate, size)
+    for line in range(bin_of(bearing[1] - gate, size), bin_of(bearing[1] + gate, size) + 1):
         for at in range(start[line * side + first], start[line * side + last + 1]):
             j = rows[at]
             if (
@@ -202,20 +158,20 @@ def match_features(
     int
         Number of matches.
     """
-    side = _bins(size)
+    side = bins_per_side(size)
     taken = np.full(len(bearings_b), -1, dtype=np.int64)
     distance = np.full(len(points_a), np.inf)
     own, inverse = np.empty((3, 3)), np.empty((3, 3))
     work, bearing, difference = np.empty((2, 3, 3)), np.empty(3), np.empty(3)
     for i in range(len(points_a)):
         partner[i] = -1
-        if not _bearing(pose, points_a[i], bearing):
+        if not to_bearing(pose, points_a[i], bearing):
             continue
         _bearing_covariance(pose, covariance_a[i], bearing, work, own)
         own[0, 0] += gate * gate
         own[1, 1] += gate * gate
         own[2, 2] += gate * gate * bearing[2] * bearing[2]
-        middle = _bin(bearing[1], size) * side + _bin(bearing[0], size)
+        middle = bin_of(bearing[1], size) * side + bin_of(bearing[0], size)
         best, least = -1, np.inf
         for line in range(middle - side, middle + side + 1, side):
             for at in range(start[line - 1], start[line + 2]):
@@ -238,8 +194,16 @@ def match_features(
 
 
 @njit(cache=True, nogil=True)
-def _bearing(pose: Floats, point: Floats, bearing: Floats) -> bool:
-    """Compute (x/z, y/z, 1/z) of a feature that a motion moves; return whether it is in view."""
+def to_bearing(pose: Floats, point: Floats, bearing: Floats) -> bool:
+    """Compute (x/z, y/z, 1/z) of a feature that a motion moves; return whether it is in view.
+
+    Parameters
+    ----------
+    pose : ndarray, shape (3, 4)
+    point : ndarray, shape (3,) [m]
+    bearing : ndarray, shape (3,)
+        Result.
+    """
     for k in range(3):
         bearing[k] = (
             pose[k, 0] * point[0] + pose[k, 1] * point[1] + pose[k, 2] * point[2] + pose[k, 3]
@@ -267,7 +231,7 @@ def _distance(
         for m in range(3):
             work[k, m] = one[k, m] + other[k, m]
     _invert(work, inverse)
-    return _square(difference, inverse)
+    return square_of(difference, inverse)
 
 
 @njit(cache=True, nogil=True)
@@ -310,71 +274,15 @@ def _invert(matrix: Floats, result: Floats) -> None:
 
 
 @njit(cache=True, nogil=True)
-def normal_equations(
-    pose: Floats,
-    points_a: Floats,
-    partner: Ints,
-    residuals: Floats,
-    information: Floats,
-    scale: float,
-    directions: Floats,
-) -> tuple[Floats, Floats]:
-    """Return the normal equations of a small motion that reduces the residuals.
+def square_of(difference: Floats, information: Floats) -> float:
+    """Return the squared Mahalanobis distance.
 
     Parameters
     ----------
-    pose : ndarray, shape (3, 4)
-    points_a : ndarray, shape (n, 3) [m]
-    partner, residuals, information : ndarray
-        From `match_features`.
-    scale : float
-        Squared Mahalanobis distance at which the weight of a match is a quarter.
-    directions : ndarray, shape (6, d)
-        Small motions, each a translation [m] and a rotation vector [rad], in B.
-
-    Returns
-    -------
-    matrix : ndarray, shape (d, d)
-    right : ndarray, shape (d,)
-        The step solves ``matrix @ step = right``.
+    difference : ndarray, shape (3,)
+    information : ndarray, shape (3, 3)
+        Inverse covariance.
     """
-    matrix = np.zeros((6, 6))
-    right = np.zeros(6)
-    design, weighted = np.zeros((3, 6)), np.zeros((3, 6))
-    bearing = np.empty(3)
-    for i in range(len(points_a)):
-        if partner[i] < 0:
-            continue
-        _bearing(pose, points_a[i], bearing)
-        u, v, w = bearing
-        x, y, z = u / w, v / w, 1.0 / w
-        design[0, 0], design[0, 2] = w, -u * w
-        design[1, 1], design[1, 2] = w, -v * w
-        design[2, 2] = -w * w
-        for k in range(3):
-            by_x, by_y, by_z = design[k, 0], design[k, 1], design[k, 2]
-            design[k, 3] = by_z * y - by_y * z
-            design[k, 4] = by_x * z - by_z * x
-            design[k, 5] = by_y * x - by_x * y
-        weight = 1.0 / (1.0 + _square(residuals[i], information[i]) / scale) ** 2
-        for axis in range(3):
-            for k in range(6):
-                weighted[axis, k] = weight * (
-                    information[i, axis, 0] * design[0, k]
-                    + information[i, axis, 1] * design[1, k]
-                    + information[i, axis, 2] * design[2, k]
-                )
-        for k in range(6):
-            for axis in range(3):
-                right[k] -= weighted[axis, k] * residuals[i, axis]
-                for m in range(6):
-                    matrix[k, m] += design[axis, k] * weighted[axis, m]
-    return directions.T @ matrix @ directions, directions.T @ right
-
-
-@njit(cache=True, nogil=True)
-def _square(difference: Floats, information: Floats) -> float:
-    """Return the squared Mahalanobis distance."""
     square = 0.0
     for k in range(3):
         for m in range(3):
