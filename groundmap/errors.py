@@ -8,6 +8,7 @@
     │   ├── CameraError              a rig or a pose is not that of a camera
     │   └── FileFormatError          a file is missing, unreadable or not in its format
     ├── NoGroundPlaneError           a camera has no ground plane below it
+    ├── RegistrationError            features do not determine a motion or a pose
     └── MergeError                   two maps cannot be merged
 
 The exceptions compose their messages from facts, in the same order: the expected value, the
@@ -149,3 +150,19 @@ class NoGroundPlaneError(GroundmapError):
 
 class MergeError(GroundmapError):
     """Two maps differ in resolution, frame, origin or update rule, and cannot be merged."""
+
+
+class RegistrationError(GroundmapError):
+    """Features do not determine the motion between views, or the pose of a view in a map.
+
+    Parameters
+    ----------
+    reason : {"too_few", "ambiguous", "undetermined"}
+        Too few features agree under any motion, two motions explain the features alike, or the
+        matched features leave a direction open.
+    message : str
+    """
+
+    def __init__(self, reason: str, message: str) -> None:
+        self.reason = reason
+        super().__init__(message)

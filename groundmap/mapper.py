@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from groundmap.arrays import Floats, Ints
+from groundmap.arrays import Floats, Ints, as_floats
+from groundmap.errors import InputError
 from groundmap.evidence.builders import BUILDERS
-from groundmap.evidence.evidence import Evidence
+from groundmap.evidence.kept_views import KeptView, moved_views, unique_cells
 from groundmap.grid.cell_set import CellSet
 from groundmap.grid.fusion import RULES
 from groundmap.grid.grid import ConfidenceGrid
@@ -49,6 +52,8 @@ class GroundMapper:
     ----------
     stages : Stopwatch, optional
         Stopwatch for the time of each step, if it is shared with other code.
+    keep_views : bool, default False
+        Keep a reference to each view and its evidence (about 0.2 MB), for `refuse`.
     **settings
         Fields of `groundmap.MapperSettings`: ``mode``, ``resolution`` [m], ``fusion``,
         ``uncertainty``, ``max_range`` [m], ``step_height`` [m], ...
@@ -85,7 +90,9 @@ class GroundMapper:
     array([-0.25,  0.  ], dtype=float32)
     """
 
-    def __init__(self, *, stages: Stopwatch | None = None, **settings: Any) -> None:
+    def __init__(
+        self, *, stages: Stopwatch | None = None, keep_views: bool = False, **settings: Any
+    ) -> None:
         self.settings = MapperSettings(**settings)
         parameters = {"cap": self.settings.cap} if self.settings.fusion == "capped" else {}
         self._builder = BUILDERS[self.settings.mode]
@@ -104,7 +111,8 @@ class GroundMapper:
         )
         self.stats = MapperStats()
         self.stages = stages or Stopwatch()
-        self._last: Evidence | None = None
+        self._find_changed: Callable[[], Ints] = self._find_none
+        self._kept: list[KeptView] | None = [] if keep_views else None
 
     @property
     def changed(self) -> Ints:
@@ -112,9 +120,10 @@ class GroundMapper:
 
         On a 3-D map ``[layer, row, col]``, shape (n, 3).
         """
-        if self._last is None:
-            return np.empty((0, self.grid.ndim), dtype=np.int64)
-        return self._last.cells()
+        return self._find_changed()
+
+    def _find_none(self) -> Ints:
+        return np.empty((0, self.grid.ndim), dtype=np.int64)
 
     def integrate(self, view: View) -> None:
         """Add the evidence of one view to the grid; a refused view does not change the grid.
@@ -138,13 +147,15 @@ class GroundMapper:
         parts = self.explain(view)
         with self.stages.measure("fuse"):
             self.grid.fuse(*parts.evidence)
-            self._last = parts.evidence
+            self._find_changed = parts.evidence.cells
             recent = parts.recent_view(view.timestamp)
             if recent is not None:
                 self.grid.recent_views.add(recent)
             self.grid.trajectory = np.concatenate([self.grid.trajectory, _pose2d(view)])
             self.grid.planes = np.concatenate([self.grid.planes, parts.planes])
         counts = parts.counts
+        if self._kept is not None:
+            self._kept.append(KeptView.of(view, parts.evidence, parts.planes))
         self.stats.views += 1
         self.stats.features_used += counts.used
         self.stats.features_dropped.update(counts.dropped)
@@ -155,6 +166,69 @@ class GroundMapper:
     def recent(self) -> CellSet:
         """What is there now: the cells that the newest views saw as non-free, see `grid`."""
         return self.grid.recent
+
+    def refuse(
+        self, poses: npt.ArrayLike, *, tolerance: float = 0.0, turn_tolerance: float = 0.0
+    ) -> int:
+        """Correct the poses of all views after the fact, as when a loop was closed.
+
+        The map is the same as one of all views with the new poses. Only tiles that views with
+        another pose touch, before or after, are built anew. `stats` are not changed.
+
+        Parameters
+        ----------
+        poses : array_like, shape (n, 4, 4) [m, map]
+            `View.T_map_base` of all integrated views, in their order.
+        tolerance : float, default 0 [m]
+            Views that moved by no more stay as they are mapped,
+        turn_tolerance : float, default 0 [rad]
+            if they turned by no more than this, too.
+
+        Returns
+        -------
+        int
+            Number of views with another pose.
+
+        Raises
+        ------
+        InputError
+            The mapper does not keep views, or there is not one pose for each.
+        CameraError
+            A pose is not a rigid transform.
+        NoGroundPlaneError
+            With its new pose, a camera looks at the ground or the sky. The map is not changed.
+        """
+        if self._kept is None:
+            hint = "Give keep_views=True to the mapper."
+            raise InputError("refuse", "a mapper that keeps its views", "another", hint=hint)
+        new = as_floats("poses", poses, (len(self._kept), 4, 4))
+        moved = moved_views(self._kept, new, tolerance, turn_tolerance)
+        kept = list(self._kept)
+        touched = [self._find_none()]
+        for number in moved:
+            view = replace(kept[number].view, T_map_base=new[number])
+            parts = self.explain(view)
+            again = KeptView.of(view, parts.evidence, parts.planes)
+            touched += [kept[number].cells(), again.cells()]
+            kept[number] = again
+        changed = unique_cells(np.concatenate(touched))
+        self._find_changed = lambda: changed
+        with self.stages.measure("fuse"):
+            self.grid.rebuild(changed, (one.evidence() for one in kept))
+        self._kept = kept
+        if moved:
+            self.grid.trajectory = np.concatenate([_pose2d(one.view) for one in kept])
+            self.grid.planes = np.concatenate([one.planes for one in kept])
+            self._renew_recent_views([one.view for one in kept])
+        return len(moved)
+
+    def _renew_recent_views(self, views: list[View]) -> None:
+        """Replace the newest views that the grid holds by the same views at their new poses."""
+        held = self.grid.recent_views.held
+        newest = views[len(views) - len(held) :]
+        held.clear()
+        for view in newest:
+            self.grid.recent_views.add(self.explain(view).recent_view(view.timestamp))
 
     def explain(self, view: View) -> Any:
         """Return the evidence of one view with all intermediate results, without fusing it.

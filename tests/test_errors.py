@@ -30,7 +30,7 @@ def test_every_exception_is_a_groundmap_error() -> None:
         for name, value in vars(errors).items()
         if name.endswith("Error") and value not in SHARED
     ]
-    assert len(own) == 7
+    assert len(own) == 8
     assert all(issubclass(error, GroundmapError) for error in own)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
-from groundmap import GroundSettings, MapperSettings
+from groundmap import GroundSettings, MapperSettings, RegistrationSettings
 from planners import OWN_PLANNERS, SamplingSettings
 from planners.sampling.ompl_module import has_parameter, samplers
 from planners.sampling.ompl_parameters import PARAMETERS
@@ -32,6 +32,11 @@ GROUND = """
 ## Ground planes
 
 `groundmap.fit_ground(views, setting=value)`, or the table `[ground]` of the same file.
+"""
+REGISTRATION = """
+## Registration
+
+`groundmap.register(a, b, setting=value)` and `groundmap.estimate_poses(views, setting=value)`.
 """
 PLANNERS = """
 ## Planners
@@ -54,7 +59,8 @@ except for `range`, whose default depends on the map.
 def document() -> str:
     """Return the text of the file."""
     parts = [MAPS, table(MapperSettings.model_fields), GROUND]
-    parts += [table(GroundSettings.model_fields), PLANNERS]
+    parts += [table(GroundSettings.model_fields), REGISTRATION]
+    parts += [table(RegistrationSettings.model_fields), PLANNERS]
     for name, entry in sorted(OWN_PLANNERS.items()):
         if fields := own_fields(entry.settings):
             parts += [f"\n### {name}\n", table(fields)]

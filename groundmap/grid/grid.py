@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from os import PathLike
 from typing import Any
 
@@ -263,10 +263,37 @@ class ConfidenceGrid:
         z = as_evidence(z, self.ndim)
         if height is not None:
             height = as_heights(height, np.shape(z))
-        for tile, block in self._tiles.cut(lower, z):
+        self._fuse(lower, z, height)
+
+    def rebuild(
+        self, cells: Ints, evidence: Iterable[tuple[Ints, Floats32, Floats32 | None]]
+    ) -> None:
+        """Discard the tiles of some cells, and fuse the evidence of views there anew.
+
+        Parameters
+        ----------
+        cells : ndarray, shape (n, d)
+        evidence : iterable of (lower, z, height)
+            Evidence of all views, as `fuse` takes it; other tiles do not change.
+        """
+        touched = self._tiles.indices_of(cells)
+        for index in touched:
+            self._tiles.drop(index)
+            self._layers.drop(index)
+        for lower, z, height in evidence:
+            self._fuse(lower, z, height, touched)
+
+    def _fuse(
+        self,
+        lower: Ints,
+        z: Floats32,
+        height: Floats32 | None,
+        only: Container[Index] | None = None,
+    ) -> None:
+        for tile, block in self._tiles.cut(lower, z, only):
             self.rule.update(tile.confidence, tile.count, block)
         if height is not None:
-            self._layers.fuse(lower, z, height, self.rule)
+            self._layers.fuse(lower, z, height, self.rule, only)
 
     def merge(self, other: ConfidenceGrid) -> ConfidenceGrid:
         """Return a new grid with the views of both, equal to a map of all views.

@@ -8,7 +8,7 @@ is thus never in the layer of that object.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -55,7 +55,19 @@ class HeightLayers:
         """Memory of the tiles [bytes]."""
         return sum(tiles.nbytes for tiles in self._layers)
 
-    def fuse(self, lower: Ints, z: Floats32, height: Floats32, rule: UpdateRule) -> None:
+    def drop(self, index: Index) -> None:
+        """Remove a tile of all layers."""
+        for tiles in self._layers:
+            tiles.drop(index)
+
+    def fuse(
+        self,
+        lower: Ints,
+        z: Floats32,
+        height: Floats32,
+        rule: UpdateRule,
+        only: Container[Index] | None = None,
+    ) -> None:
         """Add the evidence of one view.
 
         Parameters
@@ -68,12 +80,14 @@ class HeightLayers:
             Height of the lowest line of sight over the cell where z < 0; top of the object in the
             cell where z > 0: below 0 for a drop-off, `NO_TOP` if no top was observed.
         rule : UpdateRule
+        only : container of tuple of int, optional
+            Indices of the tiles to change; default: all.
         """
         tops = (*self.heights[1:], NO_TOP)
         for tiles, sight, top in zip(self._layers, self.heights, tops, strict=True):
             low = np.zeros_like(z)
             keep_low(z.reshape(-1), height.reshape(-1), sight, top, low.reshape(-1))
-            for tile, block in tiles.cut(lower, low):
+            for tile, block in tiles.cut(lower, low, only):
                 rule.update(tile.confidence, tile.count, block)
 
     def raise_confidence(self, confidence: Floats32, lower: Ints, upper: Ints) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -84,7 +84,17 @@ class Tiles:
             return nowhere, nowhere
         return indices.min(axis=0) * self.shape, (indices.max(axis=0) + 1) * self.shape
 
-    def cut(self, lower: Ints, block: Floats32) -> Iterator[tuple[Tile, Floats32]]:
+    def drop(self, index: Index) -> None:
+        """Remove a tile, if it exists."""
+        self._held.pop(index, None)
+
+    def indices_of(self, cells: Ints) -> set[Index]:
+        """Return the indices of the tiles of cells, shape (n, d)."""
+        return {tuple(index) for index in np.unique(cells // self.shape, axis=0).tolist()}
+
+    def cut(
+        self, lower: Ints, block: Floats32, only: Container[Index] | None = None
+    ) -> Iterator[tuple[Tile, Floats32]]:
         """Split a block of cells by tile: yield each tile and its part, padded with zeros.
 
         Parts without values other than zero are skipped, and their tiles are not allocated.
@@ -94,6 +104,8 @@ class Tiles:
         lower : ndarray of int, shape (d,)
             Cell of the block's first entry.
         block : ndarray of float32
+        only : container of tuple of int, optional
+            Indices of the tiles to yield; default: all.
         """
         if block.size == 0:
             return
@@ -112,6 +124,9 @@ class Tiles:
         corner = (first * shape - lower).tolist()
         for index in np.argwhere(some).tolist():
             start = [c + i * side for c, i, side in zip(corner, index, self.shape, strict=True)]
+            number = tuple(f + i for f, i in zip(first.tolist(), index, strict=True))
+            if only is not None and number not in only:
+                continue
             there = tuple(
                 slice(max(a, 0), a + side) for a, side in zip(start, self.shape, strict=True)
             )
@@ -123,7 +138,7 @@ class Tiles:
                     for a, length in zip(start, inside.shape, strict=True)
                 )
             ] = inside
-            yield self.touch(tuple(f + i for f, i in zip(first.tolist(), index, strict=True))), part
+            yield self.touch(number), part
 
     def write(self, lower: Ints, confidence: Floats32, count: Counts) -> None:
         """Write a block of cells that lies within one tile.

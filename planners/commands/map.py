@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from groundmap import CellState, GroundMapper, View, fit_ground, pose_jumps
+from groundmap import CellState, GroundMapper, View, estimate_poses, fit_ground, pose_jumps
 from groundmap.arrays import Floats
 from groundmap.files.archive import check_writable
 from groundmap.mapper import warm_up
+from groundmap.registration.trajectory import with_poses
 from groundmap.stopwatch import Stopwatch
 from groundmap.view.diagnosis import SAMPLE, describe_dropped, likely_mistakes
 from groundmap.view.jumps import Jump
@@ -29,7 +30,7 @@ from planners.commands.sources import (
     GuessOption,
     LevelOption,
     PointNoiseOption,
-    PosesOption,
+    PosesOrModeOption,
     ScaleOption,
     ScalePointsOption,
     SourceArgument,
@@ -37,13 +38,14 @@ from planners.commands.sources import (
 )
 
 SHOWN_JUMPS = 5  # jumps of the poses, one warning each
+MODES = ("estimate", "refine")  # of --poses, beside files
 NOT_MAPPING = {"startup", "read", "compile", "save", "other"}
 
 
 def map_command(
     source: SourceArgument,
     out: Annotated[Path, typer.Option(help="File of the map: .npz.")],
-    poses: PosesOption = None,
+    poses: PosesOrModeOption = None,
     format: FormatOption = None,
     scale: ScaleOption = None,
     scale_points: ScalePointsOption = None,
@@ -90,7 +92,7 @@ def map_command(
         opened = open_source(
             source,
             format=format,
-            poses=poses,
+            poses=None if str(poses) in MODES else poses,
             scale=scale,
             scale_points=scale_points,
             camera_height=camera_height,
@@ -98,8 +100,12 @@ def map_command(
             point_noise=point_noise,
             guess_visibility=guess_visibility,
         )
+    read = stopwatch.each("read", opened.views)
+    found: dict[str, Any] = {}
+    if str(poses) in MODES:
+        read, found = _register_views(list(read), str(poses), stopwatch)
     views = fit_ground(
-        stopwatch.each("read", opened.views),
+        read,
         camera_height=opened.camera_height,
         **tables["ground"],
     )
@@ -113,8 +119,30 @@ def map_command(
         print_message(f"warning: {warning}")
     with stopwatch.measure("save"):
         mapper.grid.save(out)
-    summary = _summary(mapper, jumps, stopwatch, out) | opened.summary() | {"warnings": warnings}
+    summary = _summary(mapper, jumps, stopwatch, out) | opened.summary() | found
+    summary |= {"warnings": warnings}
     emit(summary, as_json=as_json, title=f"map of {source}")
+
+
+def _register_views(
+    views: list[View], mode: str, stopwatch: Stopwatch
+) -> tuple[Iterator[View], dict[str, Any]]:
+    """Return views with estimated or refined poses, and how these were found, as JSON values."""
+    with stopwatch.measure("register"):
+        trajectory = estimate_poses(views, mode="refine" if mode == "refine" else "estimate")
+    found = {
+        "poses": mode,
+        "registered": len(trajectory.edges) - len(trajectory.refused),
+        "places_seen_again": len(trajectory.closures),
+        "registration_refused": {str(view): why for view, why in trajectory.refused.items()},
+    }
+    if trajectory.refused:
+        count, first = len(trajectory.refused), min(trajectory.refused)
+        print_message(
+            f"warning: registration of {count} views was refused, and their given poses relative "
+            f"to the views before are used; the first is view {first}: {trajectory.refused[first]}"
+        )
+    return with_poses(views, trajectory.poses), found
 
 
 def _integrate(mapper: GroundMapper, views: Iterable[View]) -> tuple[list[View], list[Jump]]:

@@ -33,6 +33,13 @@ PosesOption = Annotated[
     Path | None,
     typer.Option(help="File with poses to use instead: TUM rows, or id + 16 numbers."),
 ]
+PosesOrModeOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="File with poses to use instead: TUM rows, or id + 16 numbers; or `estimate` to "
+        "determine them from the features alone, `refine` to start from the given ones."
+    ),
+]
 ScaleOption = Annotated[
     float | None, typer.Option(help="Metres per unit of a sparse map, which has none of its own.")
 ]

@@ -21,11 +21,14 @@ from groundmap import (
     GroundPlane,
     GroundSettings,
     MapperSettings,
+    RegistrationSettings,
     StereoRig,
     View,
+    estimate_poses,
     fit_ground,
     load_map,
     read_views,
+    register,
     write_views,
 )
 from groundmap.evaluate.protocols import evaluate
@@ -131,6 +134,25 @@ def _mapped(seen: View, draw: Draw) -> None:
     for one in fit_ground([seen], camera_height=draw.noted("height", number(draw, 0.5, 2, 0.1))):
         mapper.integrate(one)
     use_map(mapper.grid)
+
+
+def registration(draw: Draw, _folder: Path) -> None:
+    """Register two views with odd features and settings, and estimate their poses."""
+    corners = np.random.default_rng(0).uniform((-4, -1, 5), (4, 2, 12), (40, 3))
+    spread = np.tile(1e-3 * SPREAD, (40, 1, 1))
+    views = []
+    for shift in (0.0, 0.4):
+        xyz = array(draw, corners - np.array([0.0, 0.0, shift]), 0.2)
+        points = Features.points(
+            draw.noted("xyz", xyz), draw.noted("covariance", array(draw, spread, 0.2))
+        )
+        views.append(View(T_map_base=_pose(draw), rig=_rig(draw, 0.05), points=points))
+    settings = settings_of(draw, RegistrationSettings)
+    if draw.chance(0.5):
+        register(*views, guess=draw.noted("guess", array(draw, np.eye(4), 0.3)), **settings)
+    else:
+        mode: Any = draw.noted("mode", draw.pick(("estimate", "refine", "")))
+        estimate_poses(views, mode=mode, **settings)
 
 
 def mapper_settings(draw: Draw, _folder: Path) -> None:
@@ -378,6 +400,7 @@ MAP_CALLS: tuple[Call, ...] = (
     Call("rig", rig, weight=2),
     Call("features", features, weight=2),
     Call("view", view, weight=2),
+    Call("registration", registration),
     Call("mapper-settings", mapper_settings, weight=2),
     Call("plane", plane),
     Call("grid", confidence_grid, weight=0.5),

@@ -16,13 +16,14 @@ from fuzz.case import OutputError, Target
 from fuzz.draw import Draw
 from fuzz.mutate import damaged, damaged_bytes
 from fuzz.samples import Files
-from groundmap import CellState, ConfidenceGrid, load_map, read_views
+from groundmap import CellState, ConfidenceGrid, Places, load_map, read_views, recognise
 from groundmap.io.alignment import align
 from groundmap.io.movingai_scen import read_movingai_scen
 from groundmap.simulate import drive
 from planners import PlanningProblem, Roadmap, plan, read_keep_out
 from planners.commands.settings_file import read_settings
 from planners.scenario.case import load_scenario
+from sample_views import few_views
 
 MOST_POSES = 10_000  # of a drive that is driven here
 
@@ -196,6 +197,11 @@ def _poses(settings: Any) -> float:
         return float((way[0] + way[1]) / settings.every + way[2] / settings.every_turn)
 
 
+def _places(folder: Path) -> None:
+    (view,) = few_views(1)
+    recognise(view, Places.load(folder / "places.npz"))
+
+
 def _roadmap(folder: Path) -> None:
     problem = samples.roadmap_problem()
     roadmap = Roadmap.load(folder / "roadmap.npz", problem)
@@ -254,5 +260,6 @@ READERS: tuple[Texts | Archives | RosMap, ...] = (
     Texts("scenario", {"scenario.toml": samples.SCENARIO}, _scenario, weight=2),
     Texts("settings", {"s.toml": samples.SETTINGS}, lambda f: read_settings(f / "s.toml")),
     Texts("keep-out", {"areas.geojson": samples.KEEP_OUT}, _keep_out),
+    Archives("places", "places.npz", samples.places, _places),
     Archives("roadmap", "roadmap.npz", samples.roadmap, _roadmap),
 )  # fmt: skip

@@ -15,9 +15,10 @@ import sparse_bag
 import sparse_binaries
 import sparse_scene
 import sparse_texts
-from groundmap import ConfidenceGrid
+from groundmap import ConfidenceGrid, Places
 from groundmap.grid.fusion import Capped
 from planners import PlanningProblem, Roadmap
+from sample_views import few_views
 
 Files = dict[str, bytes]
 
@@ -259,6 +260,13 @@ def roadmap() -> dict[str, Any]:
     grown = Roadmap.grow(roadmap_problem(), seconds=5.0, iterations=30, seed=1, space="r2")
     with TemporaryDirectory() as folder:
         return _saved(grown, Path(folder) / "roadmap.npz")
+
+
+@cache
+def places() -> dict[str, Any]:
+    """Return the arrays of a file of places."""
+    with TemporaryDirectory() as folder:
+        return _saved(Places.of(few_views(1)), Path(folder) / "places.npz")
 
 
 def _saved(what: Any, path: Path) -> dict[str, Any]:

@@ -1,0 +1,1 @@
+"""Registration: the motion between two views, from their features alone."""
