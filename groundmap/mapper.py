@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 
 from groundmap.arrays import Floats, Ints
 from groundmap.evidence.builders import BUILDERS
-from groundmap.evidence.evidence import Evidence
+from groundmap.evidence.evidence import Evidence, add_shadow
 from groundmap.grid.cell_set import CellSet
 from groundmap.grid.fusion import RULES
 from groundmap.grid.grid import ConfidenceGrid
@@ -87,13 +87,14 @@ class GroundMapper:
 
     def __init__(self, *, stages: Stopwatch | None = None, **settings: Any) -> None:
         self.settings = MapperSettings(**settings)
-        parameters = {"cap": self.settings.cap} if self.settings.fusion == "capped" else {}
         self._builder = BUILDERS[self.settings.mode]
+        rule = RULES[self.settings.fusion]
+        parameters = {part.name: getattr(self.settings, part.name) for part in fields(rule)}
         self.grid = ConfidenceGrid(
             resolution=self.settings.resolution,
             origin=(0.0,) * self._builder.ndim,
             frame=self.settings.frame,
-            rule=RULES[self.settings.fusion](**parameters),
+            rule=rule(**parameters),
             heights=tuple(share * self.settings.step_height for share in SIGHT_STEPS),
         )
         self.grid.recent_views = RecentViews(
@@ -137,8 +138,12 @@ class GroundMapper:
         self.grid.recent_views.check(view.timestamp)
         parts = self.explain(view)
         with self.stages.measure("fuse"):
-            self.grid.fuse(*parts.evidence)
-            self._last = parts.evidence
+            evidence = parts.evidence
+            if self.grid.rule.reads_shadow:
+                eye = (view.T_map_base @ view.rig.T_base_camera)[: self.grid.ndim, 3]
+                evidence = add_shadow(evidence, self.grid, eye)
+            self.grid.fuse(*evidence)
+            self._last = evidence
             recent = parts.recent_view(view.timestamp)
             if recent is not None:
                 self.grid.recent_views.add(recent)
