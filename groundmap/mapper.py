@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy.typing as npt
 from groundmap.arrays import Floats, Ints, as_floats
 from groundmap.errors import InputError
 from groundmap.evidence.builders import BUILDERS
+from groundmap.evidence.evidence import add_shadow
 from groundmap.evidence.kept_views import KeptView, moved_views, unique_cells
 from groundmap.grid.cell_set import CellSet
 from groundmap.grid.fusion import RULES
@@ -94,13 +95,14 @@ class GroundMapper:
         self, *, stages: Stopwatch | None = None, keep_views: bool = False, **settings: Any
     ) -> None:
         self.settings = MapperSettings(**settings)
-        parameters = {"cap": self.settings.cap} if self.settings.fusion == "capped" else {}
         self._builder = BUILDERS[self.settings.mode]
+        rule = RULES[self.settings.fusion]
+        parameters = {part.name: getattr(self.settings, part.name) for part in fields(rule)}
         self.grid = ConfidenceGrid(
             resolution=self.settings.resolution,
             origin=(0.0,) * self._builder.ndim,
             frame=self.settings.frame,
-            rule=RULES[self.settings.fusion](**parameters),
+            rule=rule(**parameters),
             heights=tuple(share * self.settings.step_height for share in SIGHT_STEPS),
         )
         self.grid.recent_views = RecentViews(
@@ -146,8 +148,12 @@ class GroundMapper:
         self.grid.recent_views.check(view.timestamp)
         parts = self.explain(view)
         with self.stages.measure("fuse"):
-            self.grid.fuse(*parts.evidence)
-            self._find_changed = parts.evidence.cells
+            evidence = parts.evidence
+            if self.grid.rule.reads_shadow:
+                eye = (view.T_map_base @ view.rig.T_base_camera)[: self.grid.ndim, 3]
+                evidence = add_shadow(evidence, self.grid, eye)
+            self.grid.fuse(*evidence)
+            self._find_changed = evidence.cells
             recent = parts.recent_view(view.timestamp)
             if recent is not None:
                 self.grid.recent_views.add(recent)
@@ -192,12 +198,18 @@ class GroundMapper:
         Raises
         ------
         InputError
-            The mapper does not keep views, or there is not one pose for each.
+            The mapper does not keep views, there is not one pose for each, or its rule is
+            'absolute'.
         CameraError
             A pose is not a rigid transform.
         NoGroundPlaneError
             With its new pose, a camera looks at the ground or the sky. The map is not changed.
         """
+        if self.grid.rule.reads_shadow:
+            # The shadow of a view depends on all views before it.
+            expected = "a rule by which each view adds to the map on its own"
+            hint = "Map the views anew."
+            raise InputError("refuse", expected, repr(self.grid.rule.name), hint=hint)
         if self._kept is None:
             hint = "Give keep_views=True to the mapper."
             raise InputError("refuse", "a mapper that keeps its views", "another", hint=hint)
@@ -214,7 +226,7 @@ class GroundMapper:
         changed = unique_cells(np.concatenate(touched))
         self._find_changed = lambda: changed
         with self.stages.measure("fuse"):
-            self.grid.rebuild(changed, (one.evidence() for one in kept))
+            self.grid.rebuild(changed, (one.evidence()[:3] for one in kept))
         self._kept = kept
         if moved:
             self.grid.trajectory = np.concatenate([_pose2d(one.view) for one in kept])

@@ -110,12 +110,26 @@ class MapperSettings(Settings):
         description="kind of map: cells of the ground plane ('2d'), or voxels ('3d')",
     )
     frame: str = Field("map", description="name of the coordinate frame of the map")
-    fusion: Literal["average", "capped"] = Field(
+    fusion: Literal["average", "capped", "exponential", "log_odds", "absolute"] = Field(
         "average",
-        description="update rule: 'average' of all views, or 'capped', which forgets old views",
+        description="update rule: 'average' of all views; 'capped' or 'exponential', which forget "
+        "old views; 'log_odds' (Bayesian); or 'absolute' (the newest view decides)",
     )
     cap: int = Field(
         50, ge=1, le=2**32 - 1, description="update count from which 'capped' forgets old views"
+    )
+    alpha: float = Field(0.2, gt=0, le=1, description="weight of the newest view, 'exponential'")
+    nonfree_probability: float = Field(
+        0.7,
+        gt=0.5,
+        le=0.999,
+        description="probability that non-free evidence of one view is right, 'log_odds'",
+    )
+    free_probability: float = Field(
+        0.7, gt=0.5, le=0.999, description="the same of free evidence, 'log_odds'"
+    )
+    most_probable: float = Field(
+        0.97, gt=0.5, le=0.999, description="largest probability that a cell reaches, 'log_odds'"
     )
     uncertainty: Literal["ellipsoid", "gaussian", "radius", "none"] = Field(
         "ellipsoid",

@@ -152,7 +152,11 @@ def test_an_unknown_key_of_the_settings_file_names_the_nearest(log: Path, tmp_pa
     ("options", "sentence"),
     [
         (("--resolution", "0"), "resolution: expected greater than 0"),
-        (("--fusion", "median"), "fusion: expected 'average' or 'capped', got 'median'"),
+        (
+            ("--fusion", "median"),
+            "fusion: expected 'average', 'capped', 'exponential', 'log_odds' or 'absolute', got "
+            "'median'",
+        ),
         (("--format", "vslam"), "format: expected one of"),
         (("--poses", "nowhere.txt"), "nowhere.txt: expected a readable file"),
         (("--config", "nowhere.toml"), "nowhere.toml: expected a settings file"),

@@ -32,7 +32,7 @@ from groundmap.view.frames import T_REP103_OPTICAL, invert
 
 HEIGHT = 1.5
 GROUND = GroundPlane(normal=np.array([0.0, 0.0, 1.0]), offset=0.0)
-FUSIONS = ["average", "capped"]
+FUSIONS = ["average", "capped", "exponential", "log_odds", "absolute"]
 
 
 def rig(*, pitch: float = 0.0, yaw: float = 0.0) -> StereoRig:

@@ -54,10 +54,11 @@ def test_every_planner_is_in_the_table() -> None:
     assert [sorted(names) for names in listed] == [sorted(OWN_PLANNERS), sorted(samplers())]
 
 
-def test_the_page_of_settings_is_what_the_code_says() -> None:
+@pytest.mark.parametrize("page", ["settings", "rules"])
+def test_the_generated_pages_are_what_the_code_says(page: str) -> None:
     root = README.parent
-    made = runpy.run_path(str(root / "tools" / "make_settings.py"))["document"]()
-    assert (root / "docs" / "settings.md").read_text(encoding="utf-8") == made
+    made = runpy.run_path(str(root / "tools" / f"make_{page}.py"))["document"]()
+    assert (root / "docs" / f"{page}.md").read_text(encoding="utf-8") == made
 
 
 def test_the_first_example_has_ten_lines_at_most() -> None:

@@ -172,7 +172,7 @@ def draw_evidence(parts: ViewParts, grid: ConfidenceGrid, *, ax: Axes) -> None:
         The mapper's grid, for its cells.
     ax : matplotlib Axes
     """
-    lower, z, _ = parts.evidence
+    lower, z = parts.evidence[:2]
     x, y = grid.origin + lower[::-1] * grid.resolution
     rows, cols = z.shape
     picture = ax.imshow(

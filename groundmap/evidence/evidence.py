@@ -7,7 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from groundmap.arrays import Floats32, Ints
+from groundmap.arrays import Bools, Floats, Floats32, Ints
+from groundmap.grid.grid import ConfidenceGrid
+from groundmap.grid.shadow import behind_new_surfaces
+from groundmap.grid.window import CellState
 
 
 class Evidence(NamedTuple):
@@ -23,10 +26,14 @@ class Evidence(NamedTuple):
     z: Floats32  #: shape (rows, cols), in 3-D (layers, rows, cols), in [-1, 1]; 0 for no evidence
     #: shape of `z` [m], see `groundmap.ConfidenceGrid.fuse`; None without heights
     height: Floats32 | None = None
+    #: shape (rows, cols), region between new surfaces and the older boundary of freespace; only
+    #: for rules that read it
+    shadow: Bools | None = None
 
     def cells(self) -> Ints:
-        """Return the cells ``[row, col]`` with evidence, shape (n, d)."""
-        return np.argwhere(self.z != 0) + self.lower
+        """Return the cells ``[row, col]`` that the evidence changes, shape (n, 2)."""
+        changed = self.z != 0 if self.shadow is None else (self.z != 0) | self.shadow
+        return np.argwhere(changed) + self.lower
 
 
 class Counts(NamedTuple):
@@ -36,3 +43,22 @@ class Counts(NamedTuple):
     dropped: Counter[str]  #: other features, by reason
     seen_through: int = 0  #: features behind a surface, with a line of sight below its top
     through_viewpoint: int = 0  #: links and segments nearer than min_range
+
+
+def add_shadow(evidence: Evidence, grid: ConfidenceGrid, viewpoint: Floats) -> Evidence:
+    """Return the evidence with the region that its new surfaces hide (paper, section 4.2).
+
+    Parameters
+    ----------
+    evidence : Evidence
+        Not yet fused.
+    grid : ConfidenceGrid
+        Map of the earlier views.
+    viewpoint : ndarray, shape (d,) [m, map]
+    """
+    lower, upper = evidence.lower[::-1], (evidence.lower + evidence.z.shape)[::-1]
+    inside = np.concatenate([lower + 0.25, upper - 0.25])  # of the first cell and the last
+    cells = grid.window(np.tile(grid.origin, 2) + inside * grid.resolution)
+    free = cells.states() == CellState.FREE
+    eye = (viewpoint - cells.origin) / grid.resolution
+    return evidence._replace(shadow=behind_new_surfaces(free, evidence.z, eye[::-1]))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from groundmap.arrays import Counts, Floats, Floats32, Ints, as_cell
+from groundmap.arrays import Bools, Counts, Floats, Floats32, Ints, as_cell
 from groundmap.errors import InputError
 from groundmap.grid.arguments import (
     as_evidence,
@@ -25,6 +25,7 @@ from groundmap.grid.fusion import Average, UpdateRule
 from groundmap.grid.grid_files import GridContent, read_grid, write_grid
 from groundmap.grid.height_layers import SIGHT_HEIGHTS, HeightLayers, as_heights
 from groundmap.grid.recent_views import RecentViews
+from groundmap.grid.shadow import with_shadow
 from groundmap.grid.tiles import Index, Tile, Tiles
 from groundmap.grid.window import CellBox, CellState, GridWindow, cells_of
 
@@ -126,7 +127,7 @@ class ConfidenceGrid:
         """Return the confidence at map positions (x, y) [m]; 0 where unknown."""
         cells = cells_of(xy, self.origin, self.resolution)
         values: Floats32 = self._tiles.values_at(cells, "confidence")
-        self._layers.raise_at(values, cells)
+        self._layers.raise_at(values, cells, self.rule)
         return float(values[0]) if np.ndim(xy) == 1 else values
 
     def count_at(self, xy: npt.ArrayLike) -> int | Counts:
@@ -150,7 +151,7 @@ class ConfidenceGrid:
     def _confidence(self, lower: Ints, upper: Ints) -> Floats32:
         """Return the confidence of the cells from `lower` up to `upper`."""
         confidence = self._tiles.read(lower, upper).confidence
-        self._layers.raise_confidence(confidence, lower, upper)
+        self._layers.raise_confidence(confidence, lower, upper, self.rule)
         return confidence
 
     def cell_bounds(self) -> tuple[Ints, Ints]:
@@ -205,7 +206,7 @@ class ConfidenceGrid:
     def read(self, box: CellBox) -> GridWindow:
         """Return the cells of a box as dense arrays; each takes 8 bytes."""
         dense = self._tiles.read(box.lower, box.upper)
-        self._layers.raise_confidence(dense.confidence, box.lower, box.upper)
+        self._layers.raise_confidence(dense.confidence, box.lower, box.upper, self.rule)
         return GridWindow(dense.confidence, dense.count, box.origin, self.resolution)
 
     def window(
@@ -233,12 +234,18 @@ class ConfidenceGrid:
         cells = 0
         for index, tile in self.tiles():
             confidence = tile.confidence.copy()
-            self._layers.raise_tile(confidence, index)
+            self._layers.raise_tile(confidence, index, self.rule)
             window = GridWindow(confidence, tile.count, self.origin, self.resolution)
             cells += int((window.states() == state).sum())
         return cells * self.resolution**self.ndim
 
-    def fuse(self, lower: Ints, z: Floats32, height: Floats32 | None = None) -> None:
+    def fuse(
+        self,
+        lower: Ints,
+        z: Floats32,
+        height: Floats32 | None = None,
+        shadow: Bools | None = None,
+    ) -> None:
         """Add the evidence of one view (default rule: paper, section 5.2, equation 1).
 
         Parameters
@@ -252,17 +259,22 @@ class ConfidenceGrid:
             top of the object in the cell: below 0 for a drop-off, infinite if unknown. Free
             evidence of lines of sight above an object never cancels this object if more than one
             view observed it. Without heights, free and non-free evidence cancel each other.
+        shadow : ndarray of bool, optional
+            Cells from `groundmap.grid.shadow.behind_new_surfaces`. The rule `absolute` makes those
+            without other evidence non-free; the other rules ignore them.
 
         Raises
         ------
         InputError
-            Evidence is NaN or outside [-1, 1], a cell is out of range, or heights are NaN or of
-            another shape.
+            Evidence is NaN or outside [-1, 1], a cell is out of range, heights are NaN or of
+            another shape, or the shadow is.
         """
         lower = as_cell("lower", lower, self.ndim)
         z = as_evidence(z, self.ndim)
         if height is not None:
             height = as_heights(height, np.shape(z))
+        if shadow is not None and self.rule.reads_shadow:
+            z, height = with_shadow(z, height, shadow)
         self._fuse(lower, z, height)
 
     def rebuild(

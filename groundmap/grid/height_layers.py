@@ -20,7 +20,6 @@ from groundmap.grid.fusion import UpdateRule
 from groundmap.grid.kernels.fuse import keep_low
 from groundmap.grid.tiles import LAYERS, Index, Tile, Tiles
 
-ONE_VIEW = 1.05  # sum of evidence; a single view may be a false match
 SIGHT_HEIGHTS = (0.05, 0.15, 0.6)  # [m]
 NO_TOP = float("inf")  # [m], height of non-free evidence with an unobserved top
 
@@ -90,10 +89,12 @@ class HeightLayers:
             for tile, block in tiles.cut(lower, low, only):
                 rule.update(tile.confidence, tile.count, block)
 
-    def raise_confidence(self, confidence: Floats32, lower: Ints, upper: Ints) -> None:
+    def raise_confidence(
+        self, confidence: Floats32, lower: Ints, upper: Ints, rule: UpdateRule
+    ) -> None:
         """Raise the confidence of a box of cells to the highest of all layers, in place.
 
-        A layer counts only where the sum of its evidence exceeds that of one view.
+        A layer counts only where its evidence exceeds that of one view.
 
         Parameters
         ----------
@@ -101,35 +102,38 @@ class HeightLayers:
             Confidence of the cells of the box, raised in place.
         lower, upper : ndarray of int, shape (d,)
             First cell of the box and the cell past its last.
+        rule : UpdateRule
         """
         for tiles in self._layers:
             dense = tiles.read(lower, upper)
-            _raise(confidence, dense.confidence, dense.count)
+            _raise(confidence, dense.confidence, dense.count, rule)
 
-    def raise_tile(self, confidence: Floats32, index: Index) -> None:
+    def raise_tile(self, confidence: Floats32, index: Index, rule: UpdateRule) -> None:
         """Raise the confidence of the cells of a tile in place, as `raise_confidence`.
 
         Parameters
         ----------
         confidence : ndarray of float32, of the tile shape
         index : tuple of int
+        rule : UpdateRule
         """
         for tiles in self._layers:
             tile = tiles.get(index)
             if tile is not None:
-                _raise(confidence, tile.confidence, tile.count)
+                _raise(confidence, tile.confidence, tile.count, rule)
 
-    def raise_at(self, confidence: Floats32, cells: Ints) -> None:
+    def raise_at(self, confidence: Floats32, cells: Ints, rule: UpdateRule) -> None:
         """Raise the confidence of single cells in place, as `raise_confidence`.
 
         Parameters
         ----------
         confidence : ndarray of float32, shape (n,)
         cells : ndarray of int, shape (n, d)
+        rule : UpdateRule
         """
         for tiles in self._layers:
             low, count = tiles.values_at(cells, "confidence"), tiles.values_at(cells, "count")
-            _raise(confidence, low, count)
+            _raise(confidence, low, count, rule)
 
     def merge(self, other: HeightLayers, rule: UpdateRule) -> None:
         """Add the layers of another map in place.
@@ -219,6 +223,6 @@ def as_heights(height: npt.ArrayLike, shape: tuple[int, ...]) -> Floats32:
     return np.ascontiguousarray(array, dtype=np.float32)
 
 
-def _raise(confidence: Floats32, low: Floats32, count: Counts) -> None:
+def _raise(confidence: Floats32, low: Floats32, count: Counts, rule: UpdateRule) -> None:
     """Raise confidence in place where a layer's evidence exceeds that of one view."""
-    np.maximum(confidence, low, out=confidence, where=low * count > ONE_VIEW)
+    np.maximum(confidence, low, out=confidence, where=rule.outweighs_one_view(low, count))

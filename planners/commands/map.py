@@ -64,7 +64,11 @@ def map_command(
         ),
     ] = None,
     fusion: Annotated[
-        str | None, typer.Option(help="Update rule: average or capped; default: average.")
+        str | None,
+        typer.Option(
+            help="Update rule: average, capped, exponential, log_odds or absolute; "
+            "default: average."
+        ),
     ] = None,
     max_range: Annotated[
         float | None, typer.Option(help="Drop farther features [m]; default: 20 m.")

@@ -12,6 +12,7 @@ from groundmap import GroundMapper, GroundPlane, StereoRig, View
 from groundmap.arrays import Floats
 from groundmap.view.frames import map_from_world
 
+Fusion = Literal["average", "capped", "exponential", "log_odds", "absolute"]
 RIG = StereoRig(fx=700.0, fy=700.0, cx=320.0, cy=240.0, baseline=0.5)
 FACE = 6.0  # [m] ahead, the near face of the box; it is 0.8 m wide
 PLACES = np.array([(6.03, y) for y in (-0.3, 0.0, 0.3)])
@@ -54,13 +55,19 @@ def confidence(mapper: GroundMapper) -> npt.NDArray[np.float32]:
     return values
 
 
-@pytest.mark.parametrize("fusion", ["average", "capped"])
+CASES = [(1.2, 0.5, 1.6), (1.65, 0.2, 3.5), (1.65, 0.6, 5.0), (0.8, 0.3, 2.0), (0.5, 0.6, 1.0)]
+OTHERS: list[Fusion] = ["exponential", "log_odds", "absolute"]
+
+
 @pytest.mark.parametrize(
-    ("camera", "top", "leaves"),
-    [(1.2, 0.5, 1.6), (1.65, 0.2, 3.5), (1.65, 0.6, 5.0), (0.8, 0.3, 2.0), (0.5, 0.6, 1.0)],
+    ("camera", "top", "leaves", "fusion"),
+    [
+        *((*case, fusion) for case in CASES for fusion in ("average", "capped")),
+        *((*CASES[0], fusion) for fusion in OTHERS),
+    ],
 )
 def test_a_box_that_has_left_the_image_is_not_free_and_free_again_when_it_is_gone(
-    camera: float, top: float, leaves: float, fusion: Literal["average", "capped"]
+    camera: float, top: float, leaves: float, fusion: Fusion
 ) -> None:
     mapper = GroundMapper(resolution=0.1, fusion=fusion)
     ground, box = ground_and_box(camera, top)

@@ -33,7 +33,7 @@ from groundmap import (
 )
 from groundmap.evaluate.protocols import evaluate
 from groundmap.grid.collapse import as_planes
-from groundmap.grid.fusion import Average, Capped
+from groundmap.grid.fusion import Absolute, Average, Capped, Exponential, LogOdds
 from groundmap.io import export
 from groundmap.simulate import (
     DriveSettings,
@@ -237,7 +237,8 @@ def _tile(draw: Draw, on: ConfidenceGrid, _low: Any, _side: float, _folder: Path
 
 
 def _merge(draw: Draw, on: ConfidenceGrid, _low: Any, _side: float, _folder: Path) -> None:
-    rule = draw.pick((Average(), Capped(cap=draw.noted("cap", number(draw, 1, 9)))))
+    capped = Capped(cap=draw.noted("cap", number(draw, 1, 9)))
+    rule = draw.pick((Average(), capped, Exponential(), LogOdds(), Absolute()))
     other = draw.pick((on, ConfidenceGrid(rule=rule), ConfidenceGrid(resolution=on.resolution)))
     use_map(on.merge(other))
 

@@ -15,12 +15,23 @@ from hypothesis.extra import numpy as hnp
 from dense_grid import rounding_of_mean
 from groundmap.arrays import Counts, Floats32
 from groundmap.errors import InputError, SettingsError
-from groundmap.grid.fusion import RULES, Average, Capped, UpdateRule, rule_from
+from groundmap.grid.fusion import (
+    RULES,
+    Absolute,
+    Average,
+    Capped,
+    Exponential,
+    LogOdds,
+    UpdateRule,
+    rule_from,
+)
 from groundmap.grid.window import EPSILON
 from groundmap.settings import MapperSettings
 
 evidence = st.one_of(st.just(0.0), st.just(-0.0), st.floats(-1.0, 1.0, width=32))
 views = hnp.arrays(np.float32, st.tuples(st.integers(0, 40), st.just(4)), elements=evidence)
+
+EVERY_RULE = [Average(), Capped(5), Exponential(0.3), LogOdds(), Absolute()]
 
 
 def fused(rule: UpdateRule, z: Floats32) -> tuple[Floats32, Counts]:
@@ -48,7 +59,7 @@ def test_average_is_the_mean_of_what_is_not_zero(z: Floats32) -> None:
 
 @given(views, views)
 def test_zeros_change_neither_value_nor_count(before: Floats32, after: Floats32) -> None:
-    for rule in (Average(), Capped(5)):
+    for rule in EVERY_RULE:
         confidence, count = fused(rule, before)
         was = confidence.tobytes(), count.tobytes()
         for row in np.zeros_like(after):
@@ -129,11 +140,108 @@ def test_the_average_never_forgets() -> None:
         assert (confidence[0] >= EPSILON) == nonfree
 
 
+def views_until(rule: UpdateRule, before: Floats32, z: float) -> int:
+    """Return after how many views with evidence `z` a cell has the sign of z."""
+    confidence, count = fused(rule, before)
+    for n in range(1, 1000):
+        rule.update(confidence, count, steady(z, 1)[0])
+        if confidence[0] * np.sign(z) >= EPSILON:
+            return n
+    raise AssertionError(f"{rule} does not change its mind")
+
+
+@pytest.mark.parametrize(
+    ("rule", "false_wall", "new_wall"),
+    [
+        (Average(), 4, 205),
+        (Capped(50), 4, 36),
+        (Capped(2), 2, 2),
+        (Exponential(0.2), 4, 4),
+        (Exponential(0.5), 2, 2),
+        # 3 views add 3 ln(7/3), so 4 undo them; 200 views are clamped at 4.1 ln(7/3).
+        (LogOdds(), 4, 5),
+        (Absolute(), 1, 1),
+    ],
+    ids=str,
+)
+def test_views_until_a_false_wall_disappears_and_until_a_new_wall_appears(
+    rule: UpdateRule, false_wall: int, new_wall: int
+) -> None:
+    assert views_until(rule, steady(1.0, 3), -1.0) == false_wall
+    assert views_until(rule, steady(-1.0, 200), 1.0) == new_wall
+
+
+@given(views, st.floats(0.01, 1.0))
+def test_exponential_weighs_each_view_by_alpha_and_those_before_by_the_rest(
+    z: Floats32, alpha: float
+) -> None:
+    confidence, count = fused(Exponential(alpha), z)
+    for cell, column in enumerate(z.T.astype(np.float64)):
+        said = column[column != 0]
+        assert count[cell] == len(said)
+        if len(said):
+            weights = alpha * (1 - alpha) ** np.arange(len(said))[::-1]
+            weights[0] = (1 - alpha) ** (len(said) - 1)
+            assert abs(confidence[cell] - weights @ said) <= rounding_of_mean(4 * len(said))
+
+
+@given(views, st.floats(0.55, 0.95), st.floats(0.55, 0.95))
+def test_log_odds_multiplies_the_odds_of_all_views(
+    z: Floats32, nonfree: float, free: float
+) -> None:
+    # Six views of at most ln 19 each stay below the clamp of this rule only if they are few.
+    rule = LogOdds(nonfree, free, 0.999)
+    confidence, count = fused(rule, z[:2])
+    for cell, column in enumerate(z[:2].T.astype(np.float64)):
+        odds = 1.0
+        for value in column[column != 0]:
+            right = nonfree if value > 0 else free
+            p = (1 + value * (2 * right - 1)) / 2
+            odds *= p / (1 - p)
+        assert count[cell] == (column != 0).sum()
+        assert confidence[cell] == pytest.approx((odds - 1) / (odds + 1), abs=1e-6)
+
+
+@given(views)
+def test_log_odds_never_exceed_their_clamp(z: Floats32) -> None:
+    confidence, _ = fused(LogOdds(0.9, 0.9, 0.8), z)
+    assert (np.abs(confidence) <= np.float32(0.6)).all()
+
+
+@given(views)
+def test_absolute_holds_the_newest_evidence(z: Floats32) -> None:
+    confidence, _ = fused(Absolute(), z)
+    for cell, column in enumerate(z.T):
+        said = column[column != 0]
+        assert confidence[cell] == (said[-1] if len(said) else 0.0)
+
+
+@pytest.mark.parametrize("rule", EVERY_RULE, ids=str)
+def test_one_view_does_not_outweigh_itself_except_with_perfect_data(rule: UpdateRule) -> None:
+    one, two = fused(rule, steady(1.0, 1)), fused(rule, steady(1.0, 2))
+    assert rule.outweighs_one_view(*one)[0] == isinstance(rule, Absolute)
+    assert rule.outweighs_one_view(*two)[0]
+    assert not rule.outweighs_one_view(*fused(rule, steady(-1.0, 5)))[0]
+
+
+@pytest.mark.parametrize("alpha", [0.0, 1.1, -0.2, float("nan"), True, "much"])
+def test_an_alpha_that_is_no_weight_is_refused(alpha: object) -> None:
+    with pytest.raises(InputError, match=r"^alpha: expected a number above 0 and at most 1, got"):
+        rule_from({"name": "exponential", "alpha": alpha})
+
+
+@pytest.mark.parametrize("name", ["nonfree_probability", "free_probability", "most_probable"])
+@pytest.mark.parametrize("value", [0.5, 1.0, float("nan"), True, "sure"])
+def test_a_probability_without_information_or_doubt_is_refused(name: str, value: object) -> None:
+    with pytest.raises(InputError, match=rf"^{name}: expected a probability above 0.5 and at most"):
+        rule_from({"name": "log_odds", name: value})
+
+
 def test_only_the_average_adds_up() -> None:
     assert [name for name, rule in RULES.items() if rule.mergeable] == ["average"]
 
 
-@pytest.mark.parametrize("rule", [Average(), Capped(), Capped(7)])
+@pytest.mark.parametrize("rule", [*EVERY_RULE, Capped(), LogOdds(0.9, 0.6, 0.99)])
 def test_a_rule_comes_back_from_its_description(rule: UpdateRule) -> None:
     assert rule_from(rule.to_dict()) == rule
     assert type(rule_from(rule.to_dict())) is type(rule)
@@ -141,7 +249,10 @@ def test_a_rule_comes_back_from_its_description(rule: UpdateRule) -> None:
 
 @pytest.mark.parametrize("described", [{"name": "mean"}, {}, {"cap": 5}])
 def test_an_unknown_rule_is_refused_with_the_known_ones(described: dict[str, object]) -> None:
-    with pytest.raises(InputError, match=r"^rule: expected one of average, capped, got"):
+    with pytest.raises(
+        InputError,
+        match=r"^rule: expected one of average, capped, exponential, log_odds, absolute, got",
+    ):
         rule_from(described)
 
 
@@ -171,7 +282,8 @@ def test_merged_counts_stop_at_their_largest(a: float, k: int, b: float, n: int)
 
 @given(beliefs, counts, beliefs.filter(bool), st.one_of(st.just(MOST), st.integers(1, MOST)))
 def test_counts_of_views_stop_at_their_largest(a: float, k: int, z: float, cap: int) -> None:
-    for rule, most in ((Average(), MOST), (Capped(cap), cap)):
+    others = [(rule, MOST) for rule in EVERY_RULE if not isinstance(rule, Capped)]
+    for rule, most in (*others, (Capped(cap), cap)):
         confidence, count = cell_of(a, k)
         rule.update(confidence, count, np.array([z], dtype=np.float32))
         assert count[0] == max(k, min(k + 1, most))

@@ -18,7 +18,7 @@ from dense_grid import DenseGrid
 from groundmap import CellState, ConfidenceGrid, GridWindow
 from groundmap.arrays import Floats32, Ints
 from groundmap.errors import FileFormatError, InputError, MergeError
-from groundmap.grid.fusion import Average, Capped
+from groundmap.grid.fusion import RULES, Absolute, Average, Capped, Exponential, LogOdds
 
 RESOLUTION = 0.25  # a power of 2, so that borders between cells are exact
 ORIGINS = {2: (3.5, -1.25), 3: (3.5, -1.25, 0.75)}
@@ -255,6 +255,13 @@ def test_maps_that_do_not_add_up_are_refused(other: ConfidenceGrid, message: str
         ConfidenceGrid(resolution=1.0).merge(other)
 
 
+@pytest.mark.parametrize("name", [name for name, rule in RULES.items() if not rule.mergeable])
+def test_maps_of_rules_without_an_associative_merge_do_not_merge(name: str) -> None:
+    grid = ConfidenceGrid(rule=RULES[name]())
+    with pytest.raises(MergeError, match=f"'{name}' depends on the order of the views"):
+        grid.merge(grid)
+
+
 def test_capped_maps_do_not_merge() -> None:
     with pytest.raises(MergeError, match="'capped' depends on the order of the views"):
         ConfidenceGrid(rule=Capped(50)).merge(ConfidenceGrid(rule=Capped(50)))
@@ -301,7 +308,7 @@ def one_cell(*evidence: tuple[float, float], rule: Average | None = None) -> flo
 @given(
     st.floats(-2.0, 2.0, width=32),
     st.lists(st.floats(0.0, 3.0, width=32), max_size=300),
-    st.sampled_from([Average(), Capped(5)]),
+    st.sampled_from([Average(), Capped(5), Exponential(0.3), LogOdds(), Absolute()]),
 )
 def test_what_was_seen_is_never_outvoted_by_sight_above_its_top(
     top: float, sights: list[float], rule: Average
@@ -311,7 +318,7 @@ def test_what_was_seen_is_never_outvoted_by_sight_above_its_top(
     assert one_cell((1.0, top), (1.0, top), *over, rule=rule) > 0.0
 
 
-@pytest.mark.parametrize("rule", [Average(), Capped(5)])
+@pytest.mark.parametrize("rule", [Average(), Capped(5), Exponential(0.3), LogOdds(), Absolute()])
 @pytest.mark.parametrize("top", [-1.0, 0.2, 0.5, 1.0, 2.0])
 def test_what_was_taken_away_is_free_again_once_it_is_seen_low(top: float, rule: Average) -> None:
     there, over, low = [(1.0, top)] * 5, [(-0.1, 2.0)] * 50, [(-1.0, 0.0)] * 10

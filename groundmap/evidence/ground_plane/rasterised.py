@@ -179,7 +179,7 @@ def with_drop_offs(evidence: Evidence, ground_view: GroundView, grid: Confidence
     number = np.concatenate([np.arange(len(ground_view.drop_offs)), line])
     places = np.concatenate([ground_view.drop_offs, passed])
     cells = np.floor(_CellsOf(ground_view, grid)(places) + EDGE).astype(np.int64)[:, ::-1]
-    lower, z, height = _extend(evidence, cells.min(axis=0), cells.max(axis=0) + 1)
+    lower, z, height, _ = _extend(evidence, cells.min(axis=0), cells.max(axis=0) + 1)
     # In ascending confidence; at equal confidence the least deep comes last.
     order = np.lexsort(
         [ground_view.drop_off_heights[number], ground_view.drop_off_sureness[number]]

@@ -1,4 +1,4 @@
-"""Running averages over flat arrays."""
+"""Update rules over flat arrays."""
 
 from __future__ import annotations
 
@@ -29,6 +29,63 @@ def update_average(confidence: Floats32, count: Counts, z: Floats32, cap: int) -
             confidence[i] += weight * (z[i] - confidence[i])
             if k < cap:
                 count[i] = k + 1
+
+
+@njit(cache=True, nogil=True)
+def update_exponential(
+    confidence: Floats32, count: Counts, z: Floats32, alpha: float, most: int
+) -> None:
+    """Update exponential averages in place where z is not 0: x += alpha (z - x), first x = z.
+
+    Parameters
+    ----------
+    confidence, count : ndarray, shape (n,)
+        Average x and number of views, updated in place.
+    z : ndarray of float32, shape (n,)
+    alpha : float
+    most : int
+        Value at which counts stop.
+    """
+    for i in range(z.size):
+        if z[i] != 0.0:
+            weight = np.float32(alpha if count[i] > 0 else 1.0)
+            confidence[i] += weight * (z[i] - confidence[i])
+            if count[i] < most:
+                count[i] += 1
+
+
+@njit(cache=True, nogil=True)
+def update_log_odds(
+    confidence: Floats32,
+    count: Counts,
+    z: Floats32,
+    nonfree: float,
+    free: float,
+    clamp: float,
+    most: int,
+) -> None:
+    """Add log-odds in place where z is not 0; a confidence is tanh(log-odds / 2).
+
+    Parameters
+    ----------
+    confidence, count : ndarray, shape (n,)
+        Confidence and number of views, updated in place.
+    z : ndarray of float32, shape (n,)
+    nonfree, free : float
+        Confidence that evidence of 1 and of -1 alone makes, in (0, 1).
+    clamp : float
+        Largest size of a confidence, in (0, 1).
+    most : int
+        Value at which counts stop.
+    """
+    for i in range(z.size):
+        if z[i] != 0.0:
+            said = z[i] * (nonfree if z[i] > 0.0 else free)
+            # tanh(a + b) = (tanh a + tanh b) / (1 + tanh a tanh b)
+            x = (confidence[i] + said) / (1.0 + confidence[i] * said)
+            confidence[i] = np.float32(min(max(x, -clamp), clamp))
+            if count[i] < most:
+                count[i] += 1
 
 
 @njit(cache=True, nogil=True)
