@@ -212,7 +212,7 @@ def test_names_that_no_file_can_have_are_refused(name: str, tmp_path: Path) -> N
     view = View.from_pixels(np.eye(4), StereoRig(**RIG), points_px=[(9, 8, 1)])
     with pytest.raises(FileFormatError, match="expected a new or empty folder, got"):
         write_views([view], tmp_path / name)
-    with pytest.raises(FileFormatError, match="expected a folder of views, got"):
+    with pytest.raises(FileFormatError, match="expected a log of views, got"):
         read_views(tmp_path / name)
     with pytest.raises(FileFormatError, match="expected a file that can be written, got"):
         ConfidenceGrid().save(tmp_path / name)

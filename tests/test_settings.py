@@ -69,7 +69,7 @@ def test_no_number_may_be_nan_infinite_negative_or_a_word(
         ("resolution", 0.0, "greater than 0"),
         ("cap", 0, "greater than or equal to 1"),
         ("fusion", "mean", "'average', 'capped', 'exponential', 'log_odds' or 'absolute'"),
-        ("uncertainty", "", "'ellipsoid', 'radius' or 'none'"),
+        ("uncertainty", "", "'ellipsoid', 'gaussian', 'radius' or 'none'"),
         ("min_range", 0.0, "greater than 0"),
     ],
 )

@@ -11,7 +11,7 @@ import pytest
 from command_line import run
 
 PAGES = Path(__file__).parents[1] / "docs" / "sources"
-DATA = Path(__file__).parents[3] / "shared" / "data" / "sparse_maps"
+DATA = Path(__file__).parents[2] / "shared" / "data" / "sparse_maps"
 pytestmark = pytest.mark.skipif(not PAGES.is_dir(), reason="docs are not beside the tests")
 COMMAND = re.compile(r"^groundmap .*$", re.MULTILINE)
 SAMPLES = {

@@ -57,7 +57,9 @@ class Truth(KnownMap):
 
     def to_borders(self, points: Floats) -> Floats:
         """Return the distance of points to the nearest outline of an obstacle [m]."""
-        return _distances(points, self.obstacles.boundary)
+        # Without obstacles, shapely has no boundary.
+        outlines = self.obstacles if self.obstacles.is_empty else self.obstacles.boundary
+        return _distances(points, outlines)
 
 
 def _distances(points: Floats, geometry: shapely.Geometry) -> Floats:

@@ -86,6 +86,7 @@ def fit_ground(
 
     Examples
     --------
+    >>> from groundmap import StereoRig, View, fit_ground
     >>> rig = StereoRig(fx=700.0, fy=700.0, cx=320.0, cy=240.0, baseline=0.5)
     >>> T_map_camera = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
     >>> view = View.from_pixels(T_map_camera, rig, points_px=[(320.0, 250.0, 450.0)])
