@@ -106,6 +106,8 @@ def read_views(
     check_name(source, "a log of views")
     if not source.exists():
         raise FileFormatError(source, "a folder or file of views", "nothing of that name")
+    if not (source.is_file() or source.is_dir()):
+        raise FileFormatError(source, "a folder or file of views", "a device, pipe or socket")
     log = FORMATS[format] if format is not None else _recognise(source)
     replaced = None if poses is None else Path(poses)
     if issubclass(log, SparseMapLog):

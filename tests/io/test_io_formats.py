@@ -79,6 +79,11 @@ def test_the_error_for_an_unrecognised_folder_lists_the_files_of_each_format(
         read_views(tmp_path)
 
 
+def test_a_device_is_no_log() -> None:
+    with pytest.raises(FileFormatError, match=r"^/dev/null: expected .*, got a device, pipe or "):
+        read_views("/dev/null")
+
+
 def test_a_path_that_does_not_exist_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FileFormatError, match=r"gone: expected a folder or file .* got nothing of"):
         read_views(tmp_path / "gone")
