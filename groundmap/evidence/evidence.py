@@ -7,10 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from groundmap.arrays import Bools, Floats, Floats32, Ints
+from groundmap.arrays import FARTHEST_CELL, Bools, Floats, Floats32, Ints
+from groundmap.errors import InputError
 from groundmap.grid.grid import ConfidenceGrid
 from groundmap.grid.shadow import behind_new_surfaces
 from groundmap.grid.window import CellState
+from groundmap.printable import format_value
+
+MARGIN = 1  # [cells] around the drawn shapes, for rounding
 
 
 class Evidence(NamedTuple):
@@ -43,6 +47,41 @@ class Counts(NamedTuple):
     dropped: Counter[str]  #: other features, by reason
     seen_through: int = 0  #: features behind a surface, with a line of sight below its top
     through_viewpoint: int = 0  #: links and segments nearer than min_range
+
+
+def block_around(places: Floats, resolution: float, *, most_cells: int) -> tuple[Floats, Ints]:
+    """Return the first cell of the block around places, and its shape; x comes first in both.
+
+    Parameters
+    ----------
+    places : ndarray, shape (n, d) [cells]
+        The first is the viewpoint.
+    resolution : float [m]
+    most_cells : int
+        Largest number of cells in the block.
+
+    Raises
+    ------
+    InputError
+        The places are too far from the origin, or the block has more cells.
+    """
+    if not (np.abs(places) < FARTHEST_CELL).all():
+        raise InputError(
+            "view",
+            f"evidence within {FARTHEST_CELL * resolution:.3g} m of the origin",
+            f"a viewpoint at {format_value((places[0] * resolution).tolist())} m",
+            hint="Is a pose wrong?",
+        )
+    lower = np.floor(places.min(axis=0)) - MARGIN
+    shape = (np.floor(places.max(axis=0)) - lower).astype(np.int64) + 1 + MARGIN
+    if np.prod(shape.astype(np.float64)) > most_cells:
+        raise InputError(
+            "resolution",
+            f"one that cuts a view into {most_cells} cells at most",
+            f"{resolution} m, which makes {' x '.join(map(str, shape))}",
+            hint="Give a coarser resolution, or a smaller max_range [m].",
+        )
+    return lower, shape
 
 
 def add_shadow(evidence: Evidence, grid: ConfidenceGrid, viewpoint: Floats) -> Evidence:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from groundmap.arrays import FARTHEST_CELL, Bools, Floats, Floats32, Ints
-from groundmap.errors import InputError
-from groundmap.evidence.evidence import Evidence
+from groundmap.arrays import Bools, Floats, Floats32, Ints
+from groundmap.evidence.evidence import MARGIN, Evidence, block_around
 from groundmap.evidence.ground_plane.height_classes import GroundView
 from groundmap.evidence.ground_plane.kernels.raster import (
     EDGE,
@@ -20,10 +19,8 @@ from groundmap.evidence.ground_plane.surfaces import SurfaceKind, Surfaces
 from groundmap.evidence.ground_plane.visibility import NO_SURFACE, SightFan
 from groundmap.evidence.uncertainty import MODELS
 from groundmap.grid.grid import ConfidenceGrid
-from groundmap.printable import format_value
 from groundmap.settings import MapperSettings
 
-MARGIN = 1  # [cells] around the drawn shapes, for rounding
 LOW_SIGHT = 4.0  # [step heights], lines of sight from this height up give the least evidence
 LEAST_SURE = 0.25  # -z below high lines of sight
 CONFIRMED = 0.5  # [m], a drop-off without another within this is most likely a false match
@@ -82,22 +79,7 @@ def evidence_of(
     farthest = settings.max_range / grid.resolution
     drawn = np.concatenate([origin[None], *(array.reshape(-1, 2) for array in corners)])
     drawn = np.clip(drawn, origin - farthest - MARGIN, origin + farthest + MARGIN)
-    if not (np.abs(drawn) < FARTHEST_CELL).all():
-        raise InputError(
-            "view",
-            f"evidence within {FARTHEST_CELL * grid.resolution:.3g} m of the origin",
-            f"a viewpoint at {format_value((origin * grid.resolution).tolist())} m",
-            hint="Is a pose wrong?",
-        )
-    lower = np.floor(drawn.min(axis=0)) - MARGIN
-    shape = (np.floor(drawn.max(axis=0)) - lower).astype(np.int64) + 1 + MARGIN
-    if np.prod(shape.astype(np.float64)) > MOST_CELLS:
-        raise InputError(
-            "resolution",
-            f"one that cuts a view into {MOST_CELLS} cells at most",
-            f"{grid.resolution} m, which makes {shape[1]} x {shape[0]}",
-            hint="Give a coarser resolution, or a smaller max_range [m].",
-        )
+    lower, shape = block_around(drawn, grid.resolution, most_cells=MOST_CELLS)
     z = np.zeros(shape[::-1], dtype=np.float32)
     height = np.full(z.shape, ground_view.camera_height, dtype=np.float32)
     on_surface, around = model.evidence(reach, grid.resolution)

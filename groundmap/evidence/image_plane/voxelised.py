@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from groundmap.arrays import FARTHEST_CELL, Floats, Floats32, Ints
-from groundmap.errors import InputError
-from groundmap.evidence.evidence import Evidence
+from groundmap.arrays import Floats, Floats32, Ints
+from groundmap.evidence.evidence import Evidence, block_around
 from groundmap.evidence.image_plane.depth_buffer import SQUARE, depth_buffer_of
 from groundmap.evidence.image_plane.kernels.rays import draw_rays
 from groundmap.evidence.image_plane.kernels.visit import visit_voxels
@@ -15,12 +14,10 @@ from groundmap.evidence.image_plane.patches import ImageMesh, Patches, PatchKind
 from groundmap.evidence.image_plane.standing_room import standing_room
 from groundmap.evidence.uncertainty import MODELS
 from groundmap.grid.grid import ConfidenceGrid
-from groundmap.printable import format_value
 from groundmap.settings import MapperSettings
 from groundmap.view.view import View
 
 MOST_CELLS = 2**28  # a block of 1 GiB, of which only what is seen takes memory
-MARGIN = 1  # [voxels] around what is drawn
 LEAST_COSINE = 0.05  # of the angle between two corners of a triangle, from the camera
 FREE = np.float32(-1.0)
 
@@ -57,11 +54,12 @@ def evidence_of(
     outer = _outer(patches, settings)
     reached = np.concatenate([np.zeros((1, 3)), _reached(image, patches, outer, settings)])
     cells = (reached + camera - grid.origin) / grid.resolution
-    _block(cells, grid)  # before lines are cut into voxels
+    block_around(cells, grid.resolution, most_cells=MOST_CELLS)  # before lines are cut into voxels
     lone = lone_surfaces_of(image, patches, settings)
     room = standing_room(view, grid, settings)
     on_lines = (_extent(lone.places.reshape(-1, 3)) + camera - grid.origin) / grid.resolution
-    lower, shape = _block(np.concatenate([cells, on_lines, _extent(room), _extent(room + 1)]), grid)
+    places = np.concatenate([cells, on_lines, _extent(room), _extent(room + 1)])
+    lower, shape = block_around(places, grid.resolution, most_cells=MOST_CELLS)
     z = np.zeros(shape[::-1], dtype=np.float32)
     falloff = MODELS[settings.uncertainty].falloff.astype(np.float32)
     if len(patches.kind):
@@ -130,24 +128,3 @@ def _extent(places: Floats | Ints) -> Floats:
         return np.empty((0, 3))
     x, y, z = places.T
     return np.array([(x.min(), y.min(), z.min()), (x.max(), y.max(), z.max())], dtype=np.float64)
-
-
-def _block(cells: Floats, grid: ConfidenceGrid) -> tuple[Floats, Ints]:
-    """Return the first voxel of the block around places, shape (n, 3), and its shape: x, y, z."""
-    if not (np.abs(cells) < FARTHEST_CELL).all():
-        raise InputError(
-            "view",
-            f"evidence within {FARTHEST_CELL * grid.resolution:.3g} m of the origin",
-            f"a camera at {format_value((cells[0] * grid.resolution).tolist())} m",
-            hint="Is a pose wrong?",
-        )
-    lower = np.floor(cells.min(axis=0)) - MARGIN
-    shape = (np.floor(cells.max(axis=0)) - lower).astype(np.int64) + 1 + MARGIN
-    if np.prod(shape.astype(np.float64)) > MOST_CELLS:
-        raise InputError(
-            "resolution",
-            f"one that cuts a view into {MOST_CELLS} voxels at most",
-            f"{grid.resolution} m, which makes {' x '.join(map(str, shape))}",
-            hint="Give a coarser resolution, or a smaller max_range [m].",
-        )
-    return lower, shape
